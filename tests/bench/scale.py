@@ -2,8 +2,8 @@
 
 The last line printed is one JSON object. `dance`: the demo motion with all tracks to many viewers of one process.
 `gateway` (needs Caddy): overlays of one limb through Caddy with our Caddyfile, its CPU time per message and memory per
-viewer. `origin`: blocks over HTTP on persistent connections, as a CDN fetches them. `register` and `links`: requests to
-NATS for each session, and to PostgreSQL for each client with a share link.
+viewer. `origin`: blocks over HTTP on persistent connections, as a CDN fetches them. `register`: what idle sessions
+cost the session replicas and NATS. `links`: requests to PostgreSQL for each client with a share link.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from bunraku.client import Client
 from bunraku.messaging.bus_nats import NatsBus
 from bunraku.messaging.key_value_nats import NatsKeyValueStore
+from bunraku.playout import timeline
+from bunraku.session.session_registry import SessionRecord, SessionRegistry, session_key
 from bunraku.storage.catalogue import Catalogue
 from tests.bench.arguments import parse_parts
 from tests.bench.fanout_processes import LineProcess
@@ -168,24 +171,48 @@ def measure_origin(connections: int = 8, seconds: float = 8.0) -> Figures:
     return {"origin_blocks_second": round(fetched / seconds), "origin_us_block": round(used * 1e6 / fetched)}
 
 
-def measure_key_value_store(sessions: int = 500, rounds: int = 10) -> Figures:
-    """Measure the CPU time of a session replica and of NATS per session and heartbeat."""
+class CountingBus(NatsBus):
+    """Bus that counts its requests."""
+
+    requests = 0
+
+    async def request(self, *args: Any, **options: Any) -> bytes:
+        self.requests += 1
+        return await super().request(*args, **options)
+
+
+def measure_key_value_store(sessions: int = 1000, replicas: int = 4, seconds: float = 20.0) -> Figures:
+    """Measure the requests and the CPU time of session replicas and of NATS while no session is used."""
 
     async def run_heartbeats(server: ServerProcess) -> Figures:
-        bus = NatsBus(nats_url_of(server))
-        await bus.open()
-        key_values = NatsKeyValueStore(bus)
+        buses = [CountingBus(nats_url_of(server)) for _ in range(replicas)]
+        for bus in buses:
+            await bus.open()
+        stores = [NatsKeyValueStore(bus) for bus in buses]
+        registries = [SessionRegistry(store) for store in stores]
+        record = SessionRecord("", 1, timeline.start("m", 1_000_000, 1).pack(), "aiko")
         for number in range(sessions):
-            await key_values.put(f"sessions.{number}", bytes(80))
-        own, nats = time.process_time(), cpu_seconds(server.pid)
-        for _ in range(rounds):
-            assert len(await key_values.list_prefix("sessions")) == sessions
+            await stores[0].put(session_key(str(number)), record.pack())
+        for registry in registries:
+            registry.watch(lambda _: None)
+            await registry.synchronise()
+            assert len(registry.sessions) == sessions
+        running = [asyncio.create_task(registry.replicas.run()) for registry in registries]
+        await asyncio.sleep(2)
+        requests, own, nats = sum(bus.requests for bus in buses), time.process_time(), cpu_seconds(server.pid)
+        await asyncio.sleep(seconds)
+        requests = sum(bus.requests for bus in buses) - requests
         own, nats = time.process_time() - own, cpu_seconds(server.pid) - nats
-        await bus.close()
-        session_rounds = sessions * rounds * 1e-6
+        for task in running:
+            task.cancel()
+        await asyncio.gather(*running, return_exceptions=True)
+        for store, bus in zip(stores, buses, strict=True):
+            await store.close()
+            await bus.close()
         return {
-            "register_us_session": round(own / session_rounds),
-            "register_nats_us_session": round(nats / session_rounds),
+            "register_requests_second": round(requests / seconds, 1),
+            "register_ms_replica_second": round(own * 1e3 / seconds / replicas, 2),
+            "register_nats_ms_second": round(nats * 1e3 / seconds, 2),
         }
 
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder, run_jetstream(Path(folder)) as server:

@@ -60,14 +60,26 @@ async def put_when_available(key_values: NatsKeyValueStore, key: str, value: byt
                 return
 
 
+async def synchronise_when_available(key_values: NatsKeyValueStore) -> None:
+    """Wait until the local copy is current; retry until the servers have elected a leader."""
+    async with asyncio.timeout(60):
+        while True:
+            try:
+                await key_values.synchronise()
+            except BackendUnavailable:
+                await asyncio.sleep(0.1)
+            else:
+                return
+
+
 async def test_key_value_store_survives_the_loss_of_any_one_server(
     servers: list[ServerProcess], tmp_path: Path
 ) -> None:
     addresses = ",".join(f"bunraku:0123abcd@127.0.0.1:{server.port}" for server in servers)
     bus = NatsBus(f"tls://{addresses}?ca={tmp_path}/tls/ca.crt")
     await bus.open(20)
+    key_values = NatsKeyValueStore(bus, SERVERS)
     try:
-        key_values = NatsKeyValueStore(bus, SERVERS)
         await put_when_available(key_values, "sessions.a", b"1")
         for number, server in enumerate(servers):
             await asyncio.to_thread(server.kill)
@@ -76,10 +88,14 @@ async def test_key_value_store_survives_the_loss_of_any_one_server(
             found = await key_values.list_prefix("sessions")
             assert found["sessions.a"].value == b"1"
             assert len(found) == number + 2
+            # the watch too: its consumer was at the killed server, or its connection was
+            await synchronise_when_available(key_values)
+            assert key_values.watch().entries == found
             await asyncio.to_thread(server.start)
             # all three are up to date before the next one is killed
             await wait_for_replication(bus)
     finally:
+        await key_values.close()
         await bus.close()
 
 

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from fastapi import FastAPI, Query, Request, WebSocket
 from fastapi.responses import JSONResponse
+from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocketDisconnect
 
 from bunraku.http import problem_details
@@ -46,9 +47,10 @@ def create_app(context: ServiceContext) -> FastAPI:
 
     @app.post("/v1/sessions", status_code=201, tags=["sessions"])
     @requires(Role.CONTROL)
-    async def open_session(new: NewSession) -> JSONResponse:
+    async def open_session(new: NewSession, request: Request) -> JSONResponse:
         """Play a motion on a shared timeline."""
-        session = await sessions.open_session(new.motion, playing=new.playing, loop=new.loop)
+        subject = limited_subject(request)
+        session = await sessions.open_session(new.motion, playing=new.playing, loop=new.loop, subject=subject)
         return JSONResponse(session, 201, {"Location": f"/v1/sessions/{session['id']}"})
 
     @app.get("/v1/sessions", tags=["sessions"])
@@ -98,9 +100,12 @@ def create_app(context: ServiceContext) -> FastAPI:
     @requires(Role.CONTROL)
     async def control(socket: WebSocket, session: str, name: str = "Someone") -> None:
         with contextlib.suppress(WebSocketDisconnect):
-            await control_endpoint.serve_puppeteer(
-                socket, sessions.stage_proxy(session), context, name, sessions.counters
-            )
+            stage = sessions.stage_proxy(session, limited_subject(socket))
+            await control_endpoint.serve_puppeteer(socket, stage, context, name, sessions.counters)
+
+    def limited_subject(connection: HTTPConnection) -> str | None:
+        """Return the subject whose use is limited, None at a server without access control."""
+        return access_of(connection).subject if context.authenticator.requires_token else None
 
     async def bound_session(access: Access) -> list[dict[str, Any]]:
         try:

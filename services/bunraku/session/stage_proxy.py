@@ -24,10 +24,12 @@ class Puppeteer(Protocol):
 class StageProxy:
     """Proxy of one session. Requests raise `ProblemError`: 404 without a session, 503 without a response."""
 
-    def __init__(self, session: str, bus: Bus, key_values: KeyValueStore) -> None:
+    def __init__(self, session: str, bus: Bus, key_values: KeyValueStore, subject: str | None = None) -> None:
+        """`subject` is that of the client's token, None at a server without access control."""
         self._session = session
         self._bus = bus
         self._key_values = key_values
+        self._client_subject = subject
         self._subject = f"session.{session}"
 
     async def describe(self) -> dict[str, Any]:
@@ -55,7 +57,7 @@ class StageProxy:
 
     async def join(self, puppeteer: Puppeteer, name: str) -> None:
         """Add a puppeteer. Subscribe to `outgoing_subject` first: messages follow at once."""
-        await self._request("join", [puppeteer.id, name])
+        await self._request("join", [puppeteer.id, name, self._client_subject])
 
     def outgoing_subject(self, puppeteer: Puppeteer) -> str:
         """Return the subject of the messages to a puppeteer."""
