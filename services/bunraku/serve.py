@@ -36,6 +36,7 @@ from bunraku.http.problem_details import install_problem_handlers
 from bunraku.page_files import create_page_app
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.housekeeping import Housekeeping
 from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
 from bunraku.runtime.settings import Settings
 from bunraku.session import limb_solver
@@ -94,6 +95,10 @@ async def compose_app(
             _describe_all_services(app, [create for name, create in factories.items() if name not in apps])
             app.mount("/", create_page_app(PAGE_FOLDER))
 
+        housekeeping = Housekeeping(context, has_library="ingest" in apps)
+        stack.push_async_callback(
+            _cancel_and_wait, asyncio.create_task(housekeeping.run(WARM_UP_DELAY_S), name="housekeeping")
+        )
         stack.push_async_callback(_cancel_and_wait, asyncio.create_task(_warm_up(context, apps), name="warm up"))
         if demo:
             opening = open_demo_stage(context, apps["session"].state.sessions)

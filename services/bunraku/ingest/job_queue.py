@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 import logging
 import secrets
-import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
+from bunraku.runtime.temporary_folder import temporary_folder
 from bunraku.storage.record import Job
 
 POLL_INTERVAL_S = 2.0
@@ -169,8 +169,8 @@ class JobQueue:
                 _log.error("Job %s given up after %d attempts: %s", job.id, job.tries, job.details)
             else:
                 _log.warning("Job %s was abandoned by its replica; running it here", job.id)
-                with tempfile.TemporaryDirectory(prefix="bunraku-job-") as folder:
-                    path = Path(folder) / "source"
+                with temporary_folder("job") as folder:
+                    path = folder / "source"
                     await asyncio.to_thread(path.write_bytes, source)
                     await handler(job.details, path, UploadProgress())
         except ProblemError as error:
