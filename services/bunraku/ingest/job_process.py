@@ -11,13 +11,14 @@ import asyncio
 import contextlib
 import multiprocessing
 import os
-import resource
 from collections.abc import Callable
 from enum import StrEnum
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.runtime.sandbox import enter_sandbox, start_worker_server
 
 MAX_MEMORY_BYTES = 4 << 30
 """Address space of a job's process, in bytes."""
@@ -96,7 +97,9 @@ _FAILURE_TEXTS: dict[JobKind, _FailureTexts] = {
 }
 
 
-def _run_in_process(result_sender: Connection, kind: JobKind, arguments: tuple[Any, ...]) -> None:
+def _run_in_process(result_sender: Connection, kind: JobKind, arguments: tuple[Any, ...], timeout_s: float) -> None:
+    input_files = [argument for argument in arguments if isinstance(argument, Path)]
+    enter_sandbox(result_sender.fileno(), input_files, MAX_MEMORY_BYTES, timeout_s)
     from bunraku.ingest.jobs.audio import add_audio
     from bunraku.ingest.jobs.motion import encode_file
     from bunraku.ingest.jobs.performers import combine_performers
@@ -110,7 +113,6 @@ def _run_in_process(result_sender: Connection, kind: JobKind, arguments: tuple[A
         JobKind.SCENE: add_scene,
         JobKind.PERFORMERS: combine_performers,
     }
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
     last_report = -1
 
     def report_progress(share: float) -> None:
@@ -135,9 +137,10 @@ async def run_job(
     `on_progress` receives the completed share, 0..1. Cancellation kills the process.
     """
     receiver, sender = _process_context.Pipe(duplex=False)
-    process = _process_context.Process(target=_run_in_process, args=(sender, kind, arguments), daemon=True)
+    process = _process_context.Process(target=_run_in_process, args=(sender, kind, arguments, timeout_s), daemon=True)
     texts = _FAILURE_TEXTS[kind]
     try:
+        await _run_uninterrupted(start_worker_server)
         await _run_uninterrupted(process.start)
         sender.close()
         deadline = asyncio.get_running_loop().time() + timeout_s
