@@ -33,6 +33,7 @@ from bunraku.http.cors import CorsMiddleware
 from bunraku.http.header_timeout import MAX_HEADER_BYTES, HeaderTimeoutProtocol
 from bunraku.http.origin import parse_origins
 from bunraku.http.problem_details import install_problem_handlers
+from bunraku.http.unhandled_error import UnhandledErrorMiddleware
 from bunraku.page_files import create_page_app
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
@@ -137,6 +138,7 @@ def _add_version_route(app: FastAPI) -> BaseRoute:
 def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRoute]) -> None:
     """Add the middleware of all services. The last one added is the outermost."""
     app.add_middleware(AuthorizationMiddleware, context=context, rules=collect_route_rules(routes))
+    app.add_middleware(UnhandledErrorMiddleware)
     if origins := parse_origins(context.settings.origins):
         app.add_middleware(CorsMiddleware, origins=origins)
     app.add_middleware(AccessLogMiddleware, metrics=context.metrics, clock=context.clock)

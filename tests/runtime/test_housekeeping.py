@@ -1,13 +1,14 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 import httpx2
 import pytest
 
 from bunraku.runtime import housekeeping
-from bunraku.runtime.context import open_context
+from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.housekeeping import Housekeeping
 from bunraku.runtime.settings import Settings
 from bunraku.storage.motion_store import MotionStore
@@ -30,25 +31,34 @@ async def test_objects_of_an_ended_process_are_removed_at_the_start(tmp_path: Pa
         # a second server with the same folder leaves the files of the first
         await context.motion_store.put_log("log", b"log")
         second = Housekeeping(context, has_library=True)
-        async with second._own_data_folder():
+        async with second._own_library():
             await second.check_library()
         assert await context.motion_store.get_log("log") == b"log"
         running.cancel()
         await asyncio.wait((running,))
         third = Housekeeping(context, has_library=True)
-        async with third._own_data_folder():
+        async with third._own_library():
             await third.check_library()
         assert await context.motion_store.get_log("log") is None
 
 
 async def test_objects_that_other_processes_may_use_are_removed_after_a_day(tmp_path: Path) -> None:
-    settings = Settings(data=tmp_path, library=f"file://{tmp_path}/shared")
+    library = f"file://{tmp_path}/shared"
+    async with open_context(Settings(data=tmp_path / "first", library=library)) as first, first_owns(first):
+        await check_objects_of_others(Settings(data=tmp_path / "second", library=library), tmp_path / "shared")
+
+
+def first_owns(context: ServiceContext) -> AbstractAsyncContextManager[None]:
+    return Housekeeping(context, has_library=True)._own_library()
+
+
+async def check_objects_of_others(settings: Settings, library: Path) -> None:
     async with open_context(settings) as context:
         await context.motion_store.put_log("log", b"log")
-        now = (tmp_path / "shared/logs/log").stat().st_mtime
+        now = (library / "logs/log").stat().st_mtime
         for age_s, is_kept in ((housekeeping.ORPHAN_LIFETIME_S - 1, True), (housekeeping.ORPHAN_LIFETIME_S + 1, False)):
             keeper = Housekeeping(context, has_library=True, clock=lambda: now + age_s)  # noqa: B023
-            async with keeper._own_data_folder():
+            async with keeper._own_library():
                 await keeper.check_library()
             assert (await context.motion_store.get_log("log") is not None) == is_kept
 

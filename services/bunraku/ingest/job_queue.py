@@ -130,8 +130,8 @@ class JobQueue:
                         await self._context.catalogue.renew_jobs(self._replica_id, held_until)
                     if not self._worker_slots.locked():
                         await self._claim_abandoned_job()
-                except BackendUnavailable:
-                    # logged by the requests that need the backend
+                except (BackendUnavailable, ProblemError):
+                    # an outage or a full disk, logged by the requests that need the backend
                     continue
                 except Exception:
                     _log.exception("Job queue failed; trying again")

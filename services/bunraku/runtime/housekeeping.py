@@ -9,6 +9,7 @@ import os
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
@@ -22,7 +23,7 @@ ORPHAN_LIFETIME_S = 86_400.0
 MAINTENANCE_INTERVAL_S = 60.0
 """Interval at which reserved space is restored and a sweep that failed is tried again."""
 OWNER_FILE = "owner"
-"""File in the data folder that the process which uses it alone keeps locked."""
+"""File in the library's folder that the process which uses it alone keeps locked."""
 
 _log = logging.getLogger(__name__)
 
@@ -40,7 +41,7 @@ class Housekeeping:
 
     async def run(self, delay_s: float) -> None:
         """Sweep now and daily, until cancelled; check the motions for the first time after `delay_s`."""
-        async with self._own_data_folder():
+        async with self._own_library():
             await asyncio.to_thread(self._sweep_folders)
             await asyncio.sleep(delay_s)
             swept_at: float | None = None
@@ -76,14 +77,14 @@ class Housekeeping:
             _log.warning("Removed %d temporary folders that ended processes left behind", removed)
 
     @asynccontextmanager
-    async def _own_data_folder(self) -> AsyncIterator[None]:
-        """Find out whether this process is the only one that uses the data folder; hold its lock meanwhile."""
-        settings = self._context.settings
+    async def _own_library(self) -> AsyncIterator[None]:
+        """Find out whether this process is the only one that uses a local library; hold its lock meanwhile."""
+        library_url = self._context.settings.library_url()
         lock: int | None = None
-        if settings.bus == "memory:" and not settings.library:
+        if self._has_library and self._context.settings.bus == "memory:" and library_url.startswith("file://"):
             # a read-only folder, or Windows
             with contextlib.suppress(OSError, ImportError):
-                lock = await asyncio.to_thread(try_lock, settings.data / OWNER_FILE)
+                lock = await asyncio.to_thread(try_lock, Path(library_url.removeprefix("file://")) / OWNER_FILE)
         self._is_alone = lock is not None
         try:
             yield
