@@ -44,3 +44,8 @@ def use_up_inodes(folder: Path) -> list[Path]:
         path.touch()
     assert os.statvfs(folder).f_ffree == 0
     return files
+
+
+def remount_read_only(folder: Path) -> None:
+    """Make a file system of `mount_small_disk` read-only."""
+    subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)

@@ -65,6 +65,7 @@ def up(
 ) -> None:
     """Run the server until Ctrl-C. Several processes can share the work over a bus: BUNRAKU_BUS=nats://..."""
     from bunraku.runtime import log
+    from bunraku.runtime.context import DataFolderError
     from bunraku.runtime.metrics import MetricsListenError
     from bunraku.runtime.settings import Settings
     from bunraku.serve import SERVICES, serve
@@ -113,7 +114,7 @@ def up(
             import uvloop
 
             uvloop.run(serving)
-    except MetricsListenError as error:
+    except (MetricsListenError, DataFolderError) as error:
         err.print(str(error))
         raise typer.Exit(1) from None
     out.print("Stopped.")

@@ -37,9 +37,11 @@ from bunraku.http.origin import parse_origins
 from bunraku.http.problem_details import install_problem_handlers
 from bunraku.http.protocol import HttpLoad, HttpProtocol
 from bunraku.http.response_headers import ContentSecurityMiddleware
+from bunraku.http.unhandled_error import UnhandledErrorMiddleware
 from bunraku.page_files import create_page_app, reference_response
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
+from bunraku.runtime.housekeeping import Housekeeping
 from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
 from bunraku.runtime.settings import Settings
 from bunraku.session import limb_solver
@@ -98,6 +100,10 @@ async def compose_app(
             _describe_all_services(app, [create for name, create in factories.items() if name not in apps])
             app.mount("/", create_page_app(PAGE_FOLDER))
 
+        housekeeping = Housekeeping(context, has_library="ingest" in apps)
+        stack.push_async_callback(
+            _cancel_and_wait, asyncio.create_task(housekeeping.run(WARM_UP_DELAY_S), name="housekeeping")
+        )
         stack.push_async_callback(_cancel_and_wait, asyncio.create_task(_warm_up(context, apps), name="warm up"))
         if demo:
             opening = open_demo_stage(context, apps["session"].state.sessions)
@@ -149,6 +155,7 @@ def _add_public_routes(app: FastAPI) -> list[BaseRoute]:
 def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRoute]) -> None:
     """Add the middleware of all services. The last one added is the outermost."""
     app.add_middleware(AuthorizationMiddleware, context=context, rules=collect_route_rules(routes))
+    app.add_middleware(UnhandledErrorMiddleware)
     if origins := parse_origins(context.settings.origins):
         app.add_middleware(CorsMiddleware, origins=origins)
     app.add_middleware(ContentSecurityMiddleware)

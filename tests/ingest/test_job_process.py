@@ -2,6 +2,10 @@ from __future__ import annotations
 
 import asyncio
 import multiprocessing
+import os
+import signal
+from collections.abc import Callable
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import pytest
@@ -9,6 +13,7 @@ import pytest
 from bunraku.ingest import job_process
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.runtime.worker_message import send_message
 from tests.servers import make_bvh_clip
 
 
@@ -48,3 +53,33 @@ async def test_job_is_killed_at_its_time_limit(tmp_path: Path) -> None:
     rejected = await job_process.run_job(JobKind.MOTION, ("m1", source), 0.001)
     assert isinstance(rejected, JobRejection)
     assert "long" in rejected.title
+
+
+def stop_within_a_message(sender: Connection, *_: object) -> None:
+    # the length of a message, without the message
+    os.write(sender.fileno(), (1_000).to_bytes(4, "big"))
+    signal.pause()
+
+
+def report_for_ever(sender: Connection, *_: object) -> None:
+    while True:
+        send_message(sender, "progress", 0.5)
+
+
+def report_nonsense(sender: Connection, *_: object) -> None:
+    send_message(sender, "progress", float("nan"))
+    send_message(sender, "result", JobResult(b"m", {}))
+
+
+@pytest.mark.parametrize(
+    ("worker", "title"),
+    [(stop_within_a_message, "Takes too long"), (report_for_ever, "Unreadable"), (report_nonsense, "Unreadable")],
+)
+async def test_hostile_worker_is_a_rejection(
+    worker: Callable[..., None], title: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_process, "_run_in_process", worker)
+    result = await job_process.run_job(JobKind.MOTION, ("m1",), 15.0)
+    assert isinstance(result, JobRejection)
+    assert result.title.startswith(title)
+    assert not multiprocessing.active_children()

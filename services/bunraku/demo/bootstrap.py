@@ -10,7 +10,6 @@ import asyncio
 import hashlib
 import json
 import logging
-import tempfile
 from pathlib import Path
 
 from bunraku.ingest.audio import AudioOperation
@@ -25,6 +24,7 @@ from bunraku.messaging.lease import hold_lease
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
+from bunraku.runtime.temporary_folder import temporary_folder
 from bunraku.session.session_manager import SessionManager
 
 DEMO_NOTE_KEY = "demo"
@@ -91,9 +91,9 @@ async def _read_note(context: ServiceContext) -> tuple[str | None, str]:
 
 async def _create_motion(context: ServiceContext, fingerprint: str) -> str:
     previous, _ = await _read_note(context)
-    with tempfile.TemporaryDirectory(prefix="bunraku-demo-") as folder:
-        source = Path(folder) / "source"
-        song = Path(folder) / "song"
+    with temporary_folder("demo") as folder:
+        source = folder / "source"
+        song = folder / "song"
         (motion, title), digest = await asyncio.gather(
             asyncio.to_thread(_write_motion, source), asyncio.to_thread(_write_music, song)
         )

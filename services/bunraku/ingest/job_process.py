@@ -11,18 +11,22 @@ import asyncio
 import contextlib
 import multiprocessing
 import os
-import resource
 from collections.abc import Callable
 from enum import StrEnum
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.runtime.sandbox import enter_sandbox, start_worker_server
+from bunraku.runtime.worker_message import InvalidWorkerMessage, receive_message, send_message
 
 MAX_MEMORY_BYTES = 4 << 30
 """Address space of a job's process, in bytes."""
 MAX_PROGRESS_REPORTS = 100
 """Maximum number of progress reports of a job, few enough that its pipe never fills."""
+_PROGRESS, _RESULT = "progress", "result"
+"""Kinds of messages of a job's process: the completed share, and a `JobResult` or `JobRejection`."""
 
 
 class JobKind(StrEnum):
@@ -96,7 +100,9 @@ _FAILURE_TEXTS: dict[JobKind, _FailureTexts] = {
 }
 
 
-def _run_in_process(result_sender: Connection, kind: JobKind, arguments: tuple[Any, ...]) -> None:
+def _run_in_process(result_sender: Connection, kind: JobKind, arguments: tuple[Any, ...], timeout_s: float) -> None:
+    input_files = [argument for argument in arguments if isinstance(argument, Path)]
+    enter_sandbox(result_sender.fileno(), input_files, MAX_MEMORY_BYTES, timeout_s)
     from bunraku.ingest.jobs.audio import add_audio
     from bunraku.ingest.jobs.motion import encode_file
     from bunraku.ingest.jobs.performers import combine_performers
@@ -110,21 +116,20 @@ def _run_in_process(result_sender: Connection, kind: JobKind, arguments: tuple[A
         JobKind.SCENE: add_scene,
         JobKind.PERFORMERS: combine_performers,
     }
-    resource.setrlimit(resource.RLIMIT_AS, (MAX_MEMORY_BYTES, MAX_MEMORY_BYTES))
     last_report = -1
 
     def report_progress(share: float) -> None:
         nonlocal last_report
         if int(share * MAX_PROGRESS_REPORTS) > last_report:
             last_report = int(share * MAX_PROGRESS_REPORTS)
-            result_sender.send(share)
+            send_message(result_sender, _PROGRESS, share)
 
     try:
-        result_sender.send(functions[kind](*arguments, report_progress))
+        send_message(result_sender, _RESULT, functions[kind](*arguments, report_progress))
     except MemoryError:
         texts = _FAILURE_TEXTS[kind]
         detail = f"it needs more than {MAX_MEMORY_BYTES >> 30} GiB of memory"
-        result_sender.send(JobRejection(texts.too_large_title, detail, hint=texts.reduce_hint))
+        send_message(result_sender, _RESULT, JobRejection(texts.too_large_title, detail, hint=texts.reduce_hint))
 
 
 async def run_job(
@@ -135,24 +140,31 @@ async def run_job(
     `on_progress` receives the completed share, 0..1. Cancellation kills the process.
     """
     receiver, sender = _process_context.Pipe(duplex=False)
-    process = _process_context.Process(target=_run_in_process, args=(sender, kind, arguments), daemon=True)
+    process = _process_context.Process(target=_run_in_process, args=(sender, kind, arguments, timeout_s), daemon=True)
     texts = _FAILURE_TEXTS[kind]
     try:
+        await _run_uninterrupted(start_worker_server)
         await _run_uninterrupted(process.start)
         sender.close()
         deadline = asyncio.get_running_loop().time() + timeout_s
-        while True:
+        # a worker that sends more, or anything else, is not intact
+        for _ in range(MAX_PROGRESS_REPORTS + 2):
             async with asyncio.timeout_at(deadline):
                 await _wait_readable(receiver)
-            message = await _run_uninterrupted(receiver.recv)
-            if not isinstance(message, float):
+                # killed first, as it may stop in the middle of a message
+                message_kind, value = await _run_uninterrupted(
+                    lambda: receive_message(receiver, (JobResult, JobRejection)), process.kill
+                )
+            if message_kind == _RESULT and isinstance(value, JobResult | JobRejection):
+                return value
+            if message_kind != _PROGRESS or not isinstance(value, float) or not 0.0 <= value <= 1.0:
                 break
-            on_progress(message)
+            on_progress(value)
     except TimeoutError:
         detail = f"reading and encoding exceeded {timeout_s:g} s"
         return JobRejection("Takes too long", detail, hint=texts.reduce_hint)
-    except EOFError:
-        message = None
+    except (EOFError, InvalidWorkerMessage):
+        pass
     finally:
         if process.pid is not None:
             process.kill()
@@ -160,13 +172,11 @@ async def run_job(
             process.close()
         sender.close()
         receiver.close()
-    if isinstance(message, JobResult | JobRejection):
-        return message
     return JobRejection(texts.failed_title, texts.failed_detail, hint=texts.report_hint)
 
 
-async def _run_uninterrupted(function: Callable[[], Any]) -> Any:
-    """Return the result of `function` in a thread, and wait for the thread even when cancelled.
+async def _run_uninterrupted(function: Callable[[], Any], on_cancel: Callable[[], None] = lambda: None) -> Any:
+    """Return the result of `function` in a thread. When cancelled, call `on_cancel` and wait for the thread.
 
     Process and pipe must not be closed while a thread uses them.
     """
@@ -174,6 +184,7 @@ async def _run_uninterrupted(function: Callable[[], Any]) -> Any:
     try:
         return await asyncio.shield(running)
     except asyncio.CancelledError:
+        on_cancel()
         await asyncio.gather(running, return_exceptions=True)
         raise
 

@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 import logging
 import secrets
-import tempfile
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
@@ -25,6 +24,7 @@ from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
+from bunraku.runtime.temporary_folder import temporary_folder
 from bunraku.storage.record import Job, JobHold
 
 POLL_INTERVAL_S = 2.0
@@ -135,8 +135,8 @@ class JobQueue:
                         held_until = self._context.clock() + self._timing.lease_us
                         await self._context.catalogue.renew_jobs(self._replica_id, held_until)
                     await self._claim_abandoned_job()
-                except BackendUnavailable:
-                    # logged by the requests that need the backend
+                except (BackendUnavailable, ProblemError):
+                    # an outage or a full disk, logged by the requests that need the backend
                     continue
                 except Exception:
                     _log.exception("Job queue failed; trying again")
@@ -203,8 +203,8 @@ class JobQueue:
                 _log.error("Job %s given up after %d attempts: %s", job.id, job.tries, job.details)
             else:
                 _log.warning("Job %s was abandoned by its replica; running it here", job.id)
-                with tempfile.TemporaryDirectory(prefix="bunraku-job-") as folder:
-                    path = Path(folder) / "source"
+                with temporary_folder("job") as folder:
+                    path = folder / "source"
                     await asyncio.to_thread(path.write_bytes, source)
                     await handler(job.details, path, UploadProgress())
         except ProblemError as error:

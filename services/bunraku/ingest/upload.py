@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import secrets
-import tempfile
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from typing import Any
@@ -20,6 +19,7 @@ from bunraku.ingest.progress import UploadProgress
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.insufficient_storage import translate_disk_full
 from bunraku.runtime.problem import ProblemError
+from bunraku.runtime.temporary_folder import temporary_folder
 
 WRITE_CHUNK_BYTES = 1 << 20
 
@@ -65,8 +65,8 @@ class UploadReceiver:
                 del self._progress_by_name[name]
 
     async def _receive(self, request: Request, create_job: JobFactory, progress: UploadProgress) -> StoreOutcome:
-        with translate_disk_full("this server"), tempfile.TemporaryDirectory(prefix="bunraku-upload-") as folder:
-            path = Path(folder) / "source"
+        with translate_disk_full("this server"), temporary_folder("upload") as folder:
+            path = folder / "source"
             job = create_job(await self._write_body(request, path, progress))
             try:
                 return await _run_until_disconnect(request, self._job_queue.run_job(job, path, progress))

@@ -17,6 +17,10 @@ from bunraku.storage.motion_store import MotionStore
 from bunraku.storage.object_folder import make_durable_folder
 
 
+class DataFolderError(Exception):
+    """The data folder cannot be created."""
+
+
 @dataclass(frozen=True, slots=True)
 class ServiceContext:
     """Dependencies of a service: settings, backends, access control, metrics and clock.
@@ -47,9 +51,13 @@ async def open_context(settings: Settings) -> AsyncIterator[ServiceContext]:
     """Open the backends at the addresses in `settings` and close them at the end.
 
     A backend may still be unavailable: it is tried again when it is used, or in the background. Raise ValueError for an
-    invalid address.
+    invalid address, or `DataFolderError`.
     """
-    make_durable_folder(settings.data.resolve())
+    try:
+        make_durable_folder(settings.data.resolve())
+    except OSError as error:
+        hint = "Choose another with --data or BUNRAKU_DATA."
+        raise DataFolderError(f"Cannot create the data folder {settings.data}: {error.strerror}. {hint}") from error
     catalogue = Catalogue(settings.catalogue_url())
     motion_store = MotionStore.open(settings.library_url())
     bus, key_values = await _open_messaging(settings.bus, settings.register_replicas)
