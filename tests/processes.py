@@ -92,6 +92,11 @@ class ServerProcess:
         assert self._process is not None
         return self._process.pid
 
+    @property
+    def is_running(self) -> bool:
+        """Whether the process has been started and has not ended."""
+        return self._process is not None and self._process.poll() is None
+
     def pause(self) -> None:
         """Pause the process and its children. Return when they have stopped."""
         pids = self._process_tree()

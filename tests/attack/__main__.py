@@ -39,8 +39,11 @@ def main() -> None:
     attacks = [one for one in load_attacks().values() if is_selected(one.name, one.row)]
     inspections = [one for one in load_inspections().values() if is_selected(one.name, one.row)]
     if options.list:
-        for one in sorted([*attacks, *inspections], key=lambda each: each.row):
-            print(f"{one.row:>2} {one.name:<48} {one.criterion}")
+        lines = [(one.row, f"{one.name:<48} {one.criterion}") for one in attacks] + [
+            (one.row, f"{one.name:<48} {one.criterion}") for one in inspections
+        ]
+        for row, line in sorted(lines):
+            print(f"{row:>2} {line}")
         return
     results: list[AttackResult] = []
     if attacks:

@@ -197,7 +197,7 @@ async def unusual_requests(target: Target, report: Report) -> None:
         "method of 5 kB": health.replace(b"GET", b"G" * 5_000, 1),
         "lower-case method": health.replace(b"GET", b"get", 1),
         "HTTP/0.9": b"GET /v1/health\r\n\r\n",
-        "HTTP/1.0 keep-alive": request(target, "GET", "/v1/health", "Connection: keep-alive").replace(b"1.1", b"1.0", 1),
+        "HTTP/1.0": request(target, "GET", "/v1/health", "Connection: keep-alive").replace(b"1.1", b"1.0", 1),
         "HTTP/2 preface": b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
         "HTTP/9.9": health.replace(b"1.1", b"9.9", 1),
         "TLS hello": bytes.fromhex("1603010200010001fc0303") + bytes(500),

@@ -6,7 +6,8 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from bunraku.wire.messages import Alive, Ask, Claim, Edit, Input, Ping, Release, Report as ReportMessage
+from bunraku.wire.messages import Alive, Ask, Claim, Edit, Input, Ping, Release
+from bunraku.wire.messages import Report as ReportMessage
 from tests.attack.raw_socket import RawSocket, connect_websocket, fetch_json, frame, handshake, open_socket
 from tests.attack.registry import Report, Target, attack
 
@@ -54,6 +55,7 @@ async def flood_and_read(
     opened = await connect_websocket(target, path, token)
     if opened is None:
         report.count("refused")
+        report.require(False, f"the handshake of {what} was not answered")
         return
     began = time.monotonic()
     flooding = asyncio.create_task(flood(opened, data, began + target.seconds, batch_bytes))
@@ -125,7 +127,6 @@ async def handshakes_without_a_token(target: Target, report: Report) -> None:
                 report.count(await opened.describe_reaction())
 
     await asyncio.gather(*(run(address) for address in range(1, 5) for _ in range(8)))
-    report.require(report.answers["429"] or target.seconds < 3, "no handshake was rejected with 429")
 
 
 @attack(1, f"{CALM}; closed within the header timeout")
@@ -171,11 +172,6 @@ _stream_flood(
     "foreign_messages", "Flood a stream with messages of the other connection.", repeat(frame(BINARY, b"\x43\x80"))
 )
 _stream_flood("reports", "Flood a stream with reports.", repeat(frame(BINARY, ReportMessage(1).pack())))
-_stream_flood(
-    "empty_fragments",
-    "Flood a stream with one message in empty fragments.",
-    repeat(frame(CONTINUATION, final=False)),
-)
 _stream_flood(
     "many_fragmented_messages",
     "Flood a stream with messages in single bytes.",

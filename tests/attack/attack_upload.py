@@ -60,7 +60,8 @@ async def uploads_that_crawl(target: Target, report: Report) -> None:
     while time.monotonic() < until:
         await asyncio.gather(*(one.send(b"1\r\na\r\n") for one in chunked), *(one.send(b"a") for one in sized))
         await asyncio.sleep(1.0)
-    left = sum(not await one.is_aborted(b"") and await one.describe_reaction(0.1) == OPEN for one in chunked + sized)
+    reactions = [await one.describe_reaction(0.1) for one in chunked + sized]
+    left = reactions.count(OPEN)
     report.count(OPEN, left)
     if target.seconds >= PROGRESS_WINDOW_S:
         report.require(not left, f"{left} uploads of one byte per second are held for {target.seconds:g} s")

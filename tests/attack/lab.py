@@ -190,13 +190,13 @@ async def _prepare(url: str, folder: Path) -> tuple[str, str]:
         await client.add_scene(motion, {"lights": [[light]]})
         arm = "393-351-256-560-320-120"
         page = (await client._http.get("/")).text
-        requests = [("POST", "/v1/solve", {"proportions": arm, "targets": [[0.4, 0.1, 0.4]] * 2_000, "legs": [0.1]})]
-        for path in ("/v1/openapi.json", "/v1/docs", f"/v1/arms/{arm}/table", f"/v1/arms/{arm}/figures/circle",
-                     *re.findall(r'src="(/[^"]+\.js)"', page)):  # fmt: skip
-            requests.append(("GET", path, {}))
+        scripts = re.findall(r'src="(/[^"]+\.js)"', page)
+        paths = ["/v1/openapi.json", "/v1/docs", f"/v1/arms/{arm}/table", f"/v1/arms/{arm}/figures/circle", *scripts]
+        solve = {"proportions": arm, "targets": [[0.4, 0.1, 0.4]] * 2_000, "legs": [0.1]}
+        requests = [("POST", "/v1/solve", solve), *(("GET", path, None) for path in paths)]
         for method, path, content in requests:
             with suppress(httpx2.TransportError):
-                await client._http.request(method, path, json=content or None)
+                await client._http.request(method, path, json=content)
         await asyncio.sleep(2.0)
         await client.record(session, "warm", 1.0)
     return motion, session
