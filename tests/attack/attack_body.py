@@ -97,7 +97,7 @@ async def post_repeatedly(
     await asyncio.gather(*(run(client) for client in range(CLIENTS)))
 
 
-@attack(5, CALM, probe="solve", quick=True)
+@attack(5, CALM, probe="solve")
 async def solve_of_100_000_targets(target: Target, report: Report) -> None:
     """Solve 100,000 targets again and again on four connections."""
     body = json.dumps({"proportions": PROPORTIONS, "targets": [[0.4, 0.1, 0.4]] * 100_000}).encode()

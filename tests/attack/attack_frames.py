@@ -120,7 +120,7 @@ async def random_bytes_on_streams(target: Target, report: Report) -> None:
     await asyncio.gather(*(run(address) for address in range(1, 5)))
 
 
-@attack(18, QUIET, quick=True)
+@attack(18, QUIET)
 async def frames_before_the_handshake_is_answered(target: Target, report: Report) -> None:
     """Send frames in the same segment as the upgrade request, and reset some connections at once."""
     frames = frame(BINARY, Ping(1, 2).pack()) + frame(PING) * 50 + frame(CLOSE)
@@ -139,7 +139,7 @@ async def frames_before_the_handshake_is_answered(target: Target, report: Report
             report.require(code != 1011, f"{path}: closed with 1011")
 
 
-@attack(18, QUIET, quick=True)
+@attack(18, QUIET)
 async def handshakes_that_are_reset(target: Target, report: Report) -> None:
     """Reset connections during the handshake: before, while and after the server answers."""
     for number in range(60):

@@ -250,7 +250,7 @@ async def unusual_requests(target: Target, report: Report) -> None:
             report.require(not reaction.startswith("5") or reaction == "501", f"{name}: {reaction}")
 
 
-@attack(3, "others' overlay gap p99 <= 1.3x calm; bounded memory", quick=True)
+@attack(3, "others' overlay gap p99 <= 1.3x calm; bounded memory")
 async def pipelined_requests(target: Target, report: Report) -> None:
     """Send thousands of requests without reading a response, on four connections."""
     data = request(target, "GET", "/v1/openapi.json") * 50 + request(target, "GET", "/v1/health") * 500
@@ -298,7 +298,7 @@ async def endless_chunk_framing(target: Target, report: Report) -> None:
     await asyncio.gather(*(run(name, *data) for name, data in variants.items()))
 
 
-@attack(3, "429 for connections beyond the limit", direct=True, quick=True)
+@attack(3, "429 for connections beyond the limit")
 async def forged_forwarded_for(target: Target, report: Report) -> None:
     """Open sockets with a different X-Forwarded-For each, to evade the limit per address."""
     for number in range(700):

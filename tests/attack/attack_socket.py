@@ -157,7 +157,7 @@ def _stream_flood(name: str, about: str, data: bytes, *, connections: int = 1, q
 
 _stream_flood("ping_frames", "Flood a stream with empty Ping frames.", repeat(frame(PING)), quick=True)
 _stream_flood("full_ping_frames", "Flood a stream with Ping frames of 125 bytes.", repeat(frame(PING, bytes(125))))
-_stream_flood("pong_frames", "Flood a stream with empty Pong frames.", repeat(frame(PONG)), quick=True)
+_stream_flood("pong_frames", "Flood a stream with empty Pong frames.", repeat(frame(PONG)))
 _stream_flood(
     "acknowledging_pongs", "Flood a stream with Pong frames that acknowledge data.", repeat(frame(PONG, b"\0\0\0\1"))
 )
@@ -213,7 +213,7 @@ async def fragmented_message_without_end(target: Target, report: Report) -> None
     opened.close()
 
 
-@attack(2, CLOSED_1008, quick=True)
+@attack(2, CLOSED_1008)
 async def edits_of_an_own_timeline(target: Target, report: Report) -> None:
     """Seek on a private timeline as fast as possible."""
     edits = repeat(*(frame(BINARY, Edit(position=number * 10_000).pack()) for number in range(64)))
@@ -278,7 +278,7 @@ async def clock_pings_on_a_control_connection(target: Target, report: Report) ->
     await flood_control(target, report, lambda number: Ping(number, number).pack())
 
 
-@attack(2, CALM, quick=True)
+@attack(2, CALM)
 async def claims_and_releases(target: Target, report: Report) -> None:
     """Flood a control connection with claims and releases of all limbs."""
     await flood_control(

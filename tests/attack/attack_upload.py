@@ -124,7 +124,7 @@ async def many_small_uploads(target: Target, report: Report) -> None:
     await asyncio.gather(*running)
 
 
-@attack(7, f"4xx; {OTHERS}", probe="upload", quick=True)
+@attack(7, f"4xx; {OTHERS}", probe="upload")
 async def files_that_are_no_motions(target: Target, report: Report) -> None:
     """Upload files that are damaged, nested or endless, with hostile names."""
     clip = make_bvh_clip(1.0, 5)

@@ -13,8 +13,9 @@ from urllib.parse import quote
 from tests.attack.attack_access import HOSTILE_NAMES
 from tests.attack.inspect_storage import open_client, upload
 from tests.attack.inspection import inspection
+from tests.attack.resources import process_tree
 from tests.attack.result import AttackResult
-from tests.attack.server import ServerUnderAttack, process_tree, run_attacked_server
+from tests.attack.server import ServerUnderAttack, run_attacked_server
 from tests.credentials import SECRET, make_token
 from tests.servers import make_bvh_clip
 

@@ -20,27 +20,39 @@ from bunraku.client import Client
 from bunraku.http.access_control import Role
 from tests.attack.probe import run_probe
 from tests.attack.registry import SOURCE_ADDRESSES, Attack, Target
+from tests.attack.resources import ResourceMeter, find_service_processes
 from tests.attack.result import MAX_DESCRIPTORS_LEFT, AttackResult
-from tests.attack.server import Resources, ServerUnderAttack, run_attacked_server, wait_for_descriptors
+from tests.attack.server import ServerUnderAttack, run_attacked_server
 from tests.bench.fanout_processes import LineProcess
 from tests.credentials import OTHER_SECRET, make_token, sign_token
 from tests.servers import make_bvh_clip
 
 VIEWERS = 12
 CALM_WINDOW_S = 1.5
-"""Duration of the windows before and after an attack, seconds."""
-INITIAL_CALM_S = 6.0
-SETTLE_TIMEOUT_S = 15.0
-"""Longest time for which the next attack waits until the effects of the last one are over."""
+"""Duration of the windows before and after an attack, seconds. The first one is four times as long."""
+SETTLE_WINDOWS = 10
+"""Windows that the next attack waits for the effects of the last one to be over."""
+DESCRIPTOR_TIMEOUT_S = 15.0
+"""Time within which the server closes the descriptors of an attacker that is gone."""
 
 
 class Lab:
     """Target of all attacks. `server` is None for a server that this process has not started."""
 
-    def __init__(self, url: str, server: ServerUnderAttack | None, motion: str, session: str, observer: LineProcess):
+    def __init__(
+        self,
+        url: str,
+        server: ServerUnderAttack | None,
+        motion: str,
+        session: str,
+        observer: LineProcess,
+        window_s: float = CALM_WINDOW_S,
+    ) -> None:
         self.url, self.server, self.motion, self.session = url, server, motion, session
         self._observer = observer
-        self.calm_ms = self._measure_gaps(INITIAL_CALM_S)["p99"]
+        self._meter = server.meter if server is not None else ResourceMeter(find_service_processes)
+        self._window_s = window_s
+        self.calm_ms = self._measure_gaps(4 * window_s)["p99"]
 
     def run(self, attack: Attack, seconds: float, max_gap_ratio: float, attempts: int = 1) -> AttackResult:
         """Run an attack; repeat it if the only violation is the overlay gap."""
@@ -53,32 +65,27 @@ class Lab:
 
     def _run_once(self, attack: Attack, seconds: float, max_gap_ratio: float) -> AttackResult:
         result = AttackResult(attack.name, attack.row, attack.criterion)
-        if attack.is_direct and self.server is None:
-            result.skipped = "needs a direct connection"
-            return result
         target = self._make_target(seconds)
         with LineProcess([sys.executable, "-m", "tests.attack.attacker", attack.name]) as attacker:
             attacker.write_line(json.dumps(target.__dict__))
             attacker.read_line()
             result.gap_ms.before = self._settle()["p99"]
-            before = self._resources()
+            before = self._meter.measure()
             logged = self.server.logged_bytes() if self.server is not None else 0
-            if self.server is not None:
-                self.server.start_sampling()
-            self._observer.request("mark")
-            attacker.write_line("go")
-            self._follow(attack, attacker, result)
-            gaps = self._observer.request("gaps")
-        during = self.server.end_sampling() if self.server is not None else before
-        result.gap_ms.after = self._measure_gaps(CALM_WINDOW_S)["p99"]
+            with self._meter.record_peak() as peak:
+                self._observer.request("mark")
+                attacker.write_line("go")
+                self._follow(attack, attacker, result)
+                gaps = self._observer.request("gaps")
+        result.gap_ms.after = self._measure_gaps(self._window_s)["p99"]
+        # a calm window beside another program is not as calm as the first one
         calm = max(self.calm_ms, min(result.gap_ms.before, 2 * self.calm_ms))
         result.judge_gap(calm, gaps, max_gap_ratio)
-        if self.server is not None and before is not None and during is not None:
-            limit = before.descriptors + MAX_DESCRIPTORS_LEFT
-            after = wait_for_descriptors(self.server, limit, SETTLE_TIMEOUT_S)
-            result.set_resources(before, during, after)
-            result.judge_resources(attack.max_rss_growth_mb)
-            self._judge_log(result, logged)
+        after = self._meter.wait_for_descriptors(before.descriptors + MAX_DESCRIPTORS_LEFT, DESCRIPTOR_TIMEOUT_S)
+        result.set_resources(before, peak[0], after)
+        result.judge_resources(attack.max_rss_growth_mb)
+        if self.server is not None:
+            self._judge_log(result, self.server, logged)
         return result
 
     def _follow(self, attack: Attack, attacker: LineProcess, result: AttackResult) -> None:
@@ -102,17 +109,13 @@ class Lab:
         role = {"upload": Role.INGEST, "solve": Role.VIEW, "ticket": Role.VIEW}.get(name, Role.CONTROL)
         return run_probe(name, self.url, make_token(role, "bystander"), self.motion, self.session)
 
-    def _judge_log(self, result: AttackResult, logged: int) -> None:
-        assert self.server is not None
-        tracebacks = self.server.tracebacks_since(logged)
+    def _judge_log(self, result: AttackResult, server: ServerUnderAttack, logged: int) -> None:
+        tracebacks = server.tracebacks_since(logged)
         if tracebacks:
             kinds = "; ".join(sorted(set(tracebacks))[:3])
             result.violations.append(f"{len(tracebacks)} tracebacks in the log: {kinds}")
-        if self.server.process.poll() is not None:
+        if server.process.poll() is not None:
             result.violations.append("the server has ended")
-
-    def _resources(self) -> Resources | None:
-        return self.server.resources() if self.server is not None else None
 
     def _measure_gaps(self, seconds: float) -> dict[str, Any]:
         self._observer.request("mark")
@@ -122,9 +125,9 @@ class Lab:
 
     def _settle(self) -> dict[str, Any]:
         """Wait for a calm window, and return its gaps."""
-        until = time.monotonic() + SETTLE_TIMEOUT_S
+        until = time.monotonic() + SETTLE_WINDOWS * self._window_s
         while True:
-            gaps = self._measure_gaps(CALM_WINDOW_S)
+            gaps = self._measure_gaps(self._window_s)
             if gaps["p99"] <= 1.2 * self.calm_ms or time.monotonic() > until:
                 return gaps
 
@@ -162,7 +165,7 @@ class Lab:
 
 
 @contextmanager
-def open_lab(compose_url: str | None = None, viewers: int = VIEWERS) -> Iterator[Lab]:
+def open_lab(compose_url: str | None = None, viewers: int = VIEWERS, window_s: float = CALM_WINDOW_S) -> Iterator[Lab]:
     """Start a server, or use the one at `compose_url`, with viewers and a puppeteer of a new session."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bunraku-attack-")))
@@ -176,7 +179,7 @@ def open_lab(compose_url: str | None = None, viewers: int = VIEWERS) -> Iterator
         }
         observer.write_line(json.dumps({"url": url, "session": session, "viewers": viewers, "tokens": tokens}))
         assert observer.read_line() == "ready"
-        yield Lab(url, server, motion, session, observer)
+        yield Lab(url, server, motion, session, observer, window_s)
 
 
 async def _prepare(url: str, folder: Path) -> tuple[str, str]:

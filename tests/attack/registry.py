@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import sys
 from collections import Counter
@@ -67,8 +68,8 @@ class Report:
     async def reach_peak(self) -> None:
         """Tell the runner that the attack is at its peak, and wait until it has tried to use the server."""
         print(json.dumps({"event": "peak"}), flush=True)
-        # nothing else is to be done meanwhile, and the connections stay open
-        sys.stdin.readline()
+        # the attack goes on meanwhile
+        await asyncio.to_thread(sys.stdin.readline)
 
     def as_json(self) -> dict[str, Any]:
         """Return the report as plain values."""
@@ -84,8 +85,7 @@ class Attack:
 
     `row` is the row of the table in docs/security.md, `criterion` the requirement. `seconds` is the minimum duration of
     a full run, 0 for that of the command line. `probe` names what another subject does at the peak of the attack
-    (`tests.attack.probe`). `is_quick` attacks also run in the test suite. `is_direct` attacks need a direct connection
-    to the server.
+    (`tests.attack.probe`). `is_quick` attacks also run in the test suite.
     """
 
     name: str
@@ -95,7 +95,6 @@ class Attack:
     seconds: float
     probe: str
     is_quick: bool
-    is_direct: bool
     max_rss_growth_mb: float
 
 
@@ -109,7 +108,6 @@ def attack(
     seconds: float = 0.0,
     probe: str = "",
     quick: bool = False,
-    direct: bool = False,
     max_rss_growth_mb: float = MAX_RSS_GROWTH_MB,
 ) -> Callable[[AttackFunction], AttackFunction]:
     """Register a function as an attack. Its name is that of the function; its docstring says what it does."""
@@ -117,7 +115,7 @@ def attack(
     def register(function: AttackFunction) -> AttackFunction:
         name = function.__name__.replace("_", " ")
         assert name not in ATTACKS, f"two attacks have the name {name!r}"
-        ATTACKS[name] = Attack(name, row, criterion, function, seconds, probe, quick, direct, max_rss_growth_mb)
+        ATTACKS[name] = Attack(name, row, criterion, function, seconds, probe, quick, max_rss_growth_mb)
         return function
 
     return register

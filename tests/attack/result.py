@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from tests.attack.server import Resources
+from tests.attack.resources import Resources
 
 MAX_GAP_RATIO = 1.3
 """Largest overlay gap (p99) of calm viewers during an attack, relative to the calm one."""

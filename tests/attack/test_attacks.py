@@ -19,10 +19,12 @@ from tests.attack.inspection import Inspection, load_inspections
 from tests.attack.lab import Lab, open_lab
 from tests.attack.raw_socket import CLOSED, OPEN, RawSocket, frame
 from tests.attack.registry import Attack, Target, load_attacks
+from tests.attack.resources import Resources
 from tests.attack.result import AttackResult
-from tests.attack.server import Resources, run_attacked_server
+from tests.attack.server import run_attacked_server
 
 SECONDS = 1.0
+WINDOW_S = 0.3
 VIEWERS = 4
 MAX_GAP_RATIO = 12.0
 """Overlay gaps during an attack relative to calm ones: several times the bound of a full run, a tenth of a failure."""
@@ -32,7 +34,7 @@ QUICK_INSPECTIONS = [one for one in load_inspections().values() if one.is_quick]
 
 @pytest.fixture(scope="module")
 def lab() -> Iterator[Lab]:
-    with open_lab(viewers=VIEWERS) as opened:
+    with open_lab(viewers=VIEWERS, window_s=WINDOW_S) as opened:
         yield opened
 
 
@@ -100,7 +102,7 @@ def test_tracebacks_in_the_log_are_counted(tmp_path: Path) -> None:
             log.write('{"exception": "Traceback (most recent call last):\\n  File \\"a\\"\\nValueError: wrong"}\n')
         assert server.tracebacks_since(offset) == ['ValueError: wrong"}']
         assert server.tracebacks_since(server.logged_bytes()) == []
-        assert server.resources().rss_mb > 10.0
+        assert server.meter.measure().rss_mb > 10.0
     assert server.process.poll() is not None
 
 

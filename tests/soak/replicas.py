@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from tests.attack.server import child_pids, resident_mb
+from tests.attack.resources import child_pids, count_descriptors, resident_mb
 from tests.credentials import SECRET
 from tests.processes import ServerProcess, free_port, nats_url_of, run_jetstream, run_postgres
 
@@ -45,14 +45,6 @@ class Replicas:
                 rss = resident_mb(pid) + sum(map(resident_mb, child_pids(pid)) if name in self.backends else ())
                 found[name] = pid, round(rss, 1), count_descriptors(pid)
         return found
-
-
-def count_descriptors(pid: int) -> int:
-    """Return the number of open descriptors of a process, 0 if it has ended."""
-    try:
-        return sum(1 for _ in Path(f"/proc/{pid}/fd").iterdir())
-    except OSError:
-        return 0
 
 
 @contextmanager
