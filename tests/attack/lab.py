@@ -30,7 +30,7 @@ from tests.servers import make_bvh_clip
 VIEWERS = 12
 CALM_WINDOW_S = 1.5
 """Duration of the windows before and after an attack, seconds. The first one is four times as long."""
-SETTLE_WINDOWS = 10
+SETTLE_WINDOWS = 40
 """Windows that the next attack waits for the effects of the last one to be over."""
 DESCRIPTOR_TIMEOUT_S = 15.0
 """Time within which the server closes the descriptors of an attacker that is gone."""

@@ -126,8 +126,10 @@ def load_attacks() -> dict[str, Attack]:
     from tests.attack import (  # noqa: F401 - importing them registers the attacks
         attack_access,
         attack_body,
+        attack_control,
         attack_frames,
         attack_http,
+        attack_page,
         attack_reader,
         attack_socket,
         attack_upload,
