@@ -19,7 +19,7 @@ from tests.attack.result import MAX_GAP_RATIO, AttackResult
 
 
 def main() -> None:
-    """Parse the command line, run the attacks, print a line for each."""
+    """Parse the command line, run the attacks and print a row for each."""
     parser = argparse.ArgumentParser(prog="make verify-attack", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", default="", help="words, separated by commas: run attacks whose name contains one")
     parser.add_argument("--rows", default="", help="rows of the table, separated by commas")

@@ -131,6 +131,30 @@ async def arms_of_all_proportions(target: Target, report: Report) -> None:
     await asyncio.gather(*running)
 
 
+@attack(11, "others' overlay gap p99 <= 1.3x calm", probe="session")
+async def edits_of_an_own_session(target: Target, report: Report) -> None:
+    """Edit the timeline of an own session as fast as possible on eight connections, and change its motion."""
+    token = target.tokens["control"]
+    opened = await fetch_json(target, "POST", "/v1/sessions", {"motion": target.motion}, token=token)
+    assert opened is not None
+    path = f"/v1/sessions/{opened.json()['id']}"
+    until = time.monotonic() + target.seconds
+
+    async def run(address: int) -> None:
+        number = address
+        while time.monotonic() < until:
+            edit = {"motion": target.motion} if number % 8 == 0 else {"position": number * 1_000 % 1_000_000}
+            response = await fetch_json(target, "PATCH", path, edit, token=token, address=address)
+            report.count(str(response.status if response else None))
+            number += 1
+
+    running = [asyncio.create_task(run(address)) for address in range(1, 9)]
+    await asyncio.sleep(target.seconds / 2)
+    await report.reach_peak()
+    await asyncio.gather(*running)
+    await fetch(target, "DELETE", path, token=token)
+
+
 @attack(15, "a link never outlives what made it", quick=True)
 async def links_that_outlive_their_maker(target: Target, report: Report) -> None:
     """Create links of 31 days with tokens that expire within the hour, bound and unbound."""

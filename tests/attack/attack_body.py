@@ -176,7 +176,7 @@ async def body_in_single_byte_chunks(target: Target, report: Report) -> None:
 
 @attack(5, f"{CALM}; the connection is ended", seconds=8.0)
 async def body_in_single_byte_segments(target: Target, report: Report) -> None:
-    """Send bodies with a length, each byte in a TCP segment of its own, on twenty connections."""
+    """Send bodies with a length, each byte in a separate TCP segment, on twenty connections."""
 
     async def run(number: int) -> None:
         async with open_socket(target, address=1 + number % 4) as opened:

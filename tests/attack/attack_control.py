@@ -77,7 +77,7 @@ async def inputs_of_eight_puppeteers(target: Target, report: Report) -> None:
 
 @attack(2, CALM)
 async def puppeteers_that_join_and_leave(target: Target, report: Report) -> None:
-    """Join and leave with long names as fast as possible, so that every viewer is told."""
+    """Join and leave with long names as fast as possible, so that the server notifies every viewer."""
     name = "%F0%9F%91%BE" * 200
 
     async def run(address: int) -> None:

@@ -1,8 +1,12 @@
-"""Responses that a browser or a shared cache would misuse: rows 14 and 19."""
+"""Responses that a browser or a shared cache would misuse, and costly public files: rows 1, 14 and 19."""
 
 from __future__ import annotations
 
-from tests.attack.raw_socket import fetch
+import asyncio
+import time
+
+from tests.attack.attack_reader import find_page_files
+from tests.attack.raw_socket import fetch, open_socket, request
 from tests.attack.registry import Report, Target, attack
 
 
@@ -52,3 +56,19 @@ async def cacheable_responses(target: Target, report: Report) -> None:
             "private" in control_value or "no-store" in control_value,
             f"{method} {path.replace(motion, 'ID').replace(target.session, 'ID')}: Cache-Control: {control_value}",
         )
+
+
+@attack(1, "others' overlay gap p99 <= 1.3x calm")
+async def compressed_page_files(target: Target, report: Report) -> None:
+    """Request the scripts of the page with compression, without a token, on eight connections."""
+    paths = [*(await find_page_files(target)), "/v1/openapi.json", "/"]
+
+    async def run(address: int) -> None:
+        until, number = time.monotonic() + target.seconds, address
+        async with open_socket(target, address=address) as opened:
+            while time.monotonic() < until and not opened.is_closed:
+                await opened.send(request(target, "GET", paths[number % len(paths)], "Accept-Encoding: gzip"))
+                report.count(await opened.describe_reaction())
+                number += 1
+
+    await asyncio.gather(*(run(address) for address in range(1, 9)))

@@ -17,7 +17,7 @@ READERS = 8
 CRITERION = "RSS bounded; the connection is closed after a write deadline"
 
 
-async def _page_files(target: Target) -> list[str]:
+async def find_page_files(target: Target) -> list[str]:
     """Return the paths of the scripts of the page."""
     page = await fetch(target, "GET", "/")
     text = page.body.decode(errors="replace") if page else ""
@@ -37,7 +37,7 @@ async def _large_requests(target: Target) -> dict[str, bytes]:
         "motions": request(target, "GET", "/v1/motions?limit=200", token=token) * 1_000,
         "description": request(target, "GET", f"/v1/motions/{target.motion}/description", token=token) * 1_000,
     }
-    for path in (await _page_files(target))[:2]:
+    for path in (await find_page_files(target))[:2]:
         requests[path] = request(target, "GET", path) * 40
     return requests
 

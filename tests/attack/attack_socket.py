@@ -235,7 +235,7 @@ async def edits_of_fifty_timelines(target: Target, report: Report) -> None:
 
 @attack(2, CALM)
 async def single_byte_segments(target: Target, report: Report) -> None:
-    """Send Ping frames on twenty streams, each byte in a TCP segment of its own."""
+    """Send Ping frames on twenty streams, each byte in a separate TCP segment."""
 
     async def run() -> None:
         opened = await connect_websocket(target, target.stream, target.tokens["view"])

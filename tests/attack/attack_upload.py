@@ -6,7 +6,7 @@ import asyncio
 import secrets
 import time
 
-from tests.attack.raw_socket import OPEN, RawSocket, fetch, open_socket, request
+from tests.attack.raw_socket import OPEN, RawSocket, fetch, fetch_json, open_socket, request
 from tests.attack.registry import Report, Target, attack
 from tests.servers import make_bvh_clip
 
@@ -150,6 +150,31 @@ async def files_that_are_no_motions(target: Target, report: Report) -> None:
     running = [asyncio.create_task(run(number, *one)) for number, one in enumerate(files.items())]
     await report.reach_peak()
     await asyncio.gather(*running)
+
+
+@attack(7, OTHERS, probe="upload", max_rss_growth_mb=80.0)
+async def recordings_of_the_session(target: Target, report: Report) -> None:
+    """Record the longest time of the session again and again on eight connections."""
+    until = time.monotonic() + target.seconds
+    path, created = f"/v1/sessions/{target.session}/recordings", []
+
+    async def run(address: int) -> None:
+        while time.monotonic() < until:
+            response = await fetch_json(
+                target, "POST", path, {"seconds": 600}, token=target.tokens["ingest"], address=address, timeout_s=30.0
+            )
+            report.count(str(response.status if response else "no response"))
+            if response is not None and response.status == 201:
+                created.append(response.json()["id"])
+            else:
+                await asyncio.sleep(0.05)
+
+    running = [asyncio.create_task(run(address)) for address in range(1, 9)]
+    await asyncio.sleep(target.seconds / 2)
+    await report.reach_peak()
+    await asyncio.gather(*running)
+    for one in created:
+        await fetch(target, "DELETE", f"/v1/motions/{one}", token=target.tokens["ingest"])
 
 
 @attack(7, "the progress of another subject's upload is not shown and not blocked")

@@ -169,7 +169,7 @@ def order_of_system_calls(result: AttackResult) -> None:
             upload(http)
             offset = trace.stat().st_size
             answered = upload(http)
-            # strace writes a line when the call has ended
+            # strace logs a call when it has ended
             time.sleep(0.5)
             calls = trace.read_bytes()[offset:].decode(errors="replace").splitlines()
             motion, library = answered.json()["id"], server.data / "library"
@@ -237,7 +237,7 @@ def object_lost_in_a_power_cut(result: AttackResult) -> None:
 
 @inspection(12, "nothing of killed servers is left after the next start")
 def leftovers_of_killed_servers(result: AttackResult) -> None:
-    """Kill a server several times during uploads and recordings, start it again, and look for what is left."""
+    """Kill a server several times during uploads and recordings, start it again, and look for leftovers."""
     with tempfile.TemporaryDirectory(prefix="bunraku-attack-") as name:
         folder, temporary = Path(name), Path(name) / "temporary"
         temporary.mkdir()

@@ -1,4 +1,4 @@
-"""What another subject does at the peak of an attack. A probe returns why it failed, None if it succeeded."""
+"""Uses of the server by another subject at the peak of an attack."""
 
 from __future__ import annotations
 

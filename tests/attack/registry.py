@@ -66,7 +66,7 @@ class Report:
             self.violations.append(violation)
 
     async def reach_peak(self) -> None:
-        """Tell the runner that the attack is at its peak, and wait until it has tried to use the server."""
+        """Report the peak of the attack to the runner, and wait until it has tried to use the server."""
         print(json.dumps({"event": "peak"}), flush=True)
         # the attack goes on meanwhile
         await asyncio.to_thread(sys.stdin.readline)
@@ -110,7 +110,7 @@ def attack(
     quick: bool = False,
     max_rss_growth_mb: float = MAX_RSS_GROWTH_MB,
 ) -> Callable[[AttackFunction], AttackFunction]:
-    """Register a function as an attack. Its name is that of the function; its docstring says what it does."""
+    """Register a function as an attack. Its name is that of the function; its docstring describes it."""
 
     def register(function: AttackFunction) -> AttackFunction:
         name = function.__name__.replace("_", " ")

@@ -49,7 +49,7 @@ class AttackResult:
 
     @property
     def held(self) -> bool | None:
-        """Whether the server has met every criterion."""
+        """True if the server has met every criterion, None for a skipped attack."""
         return None if self.skipped else not self.violations
 
     @property

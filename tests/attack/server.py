@@ -102,6 +102,6 @@ def run_attacked_server(
 
 
 def _exception_line(traceback: str) -> str:
-    """Return the line that names the exception of a traceback."""
+    """Return the exception of a traceback."""
     lines = [line for line in traceback.splitlines()[1:] if line and not line.startswith((" ", "\t"))]
     return lines[0][:200] if lines else "unknown"

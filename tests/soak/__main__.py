@@ -1,7 +1,7 @@
 """Soak test: `make soak MINUTES=60`. The last line printed is one JSON object.
 
 Two replicas of every service run on a real NATS server and a real PostgreSQL server. Viewers come and go, a hand is
-controlled, motions are uploaded and recorded, sessions open and end, and replicas are killed in turn. A line per minute
+controlled, motions are uploaded and recorded, sessions open and end, and replicas are killed in turn. A row per minute
 shows overlay gaps, memory and descriptors. The exit status is 1 if a criterion is not met.
 """
 
@@ -77,7 +77,7 @@ class Soak:
         return self._judge(figures, left, lost)
 
     async def _report_minutes(self, audience: LineProcess) -> dict[str, Any]:
-        """Print a line per minute until the end; return the last figures of the viewers."""
+        """Print a row per minute until the end; return the last figures of the viewers."""
         figures: dict[str, Any] = {}
         began = time.monotonic()
         minutes = 0
@@ -144,7 +144,7 @@ def format_minute(
     lost: int,
     kills: list[str],
 ) -> str:
-    """Format the line of one minute."""
+    """Format the row of one minute."""
     processes = ", ".join(f"{name} {rss:.0f} MB {descriptors} fds" for name, (_, rss, descriptors) in measured.items())
     work = ", ".join(f"{name} {number}" for name, number in sorted(workload.counts.items()))
     return (
