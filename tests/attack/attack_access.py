@@ -62,7 +62,7 @@ async def _post_many(target: Target, report: Report, path: str, content: object,
     return created
 
 
-@attack(11, "quota per subject; others open sessions", probe="session", quick=True)
+@attack(11, "quota per subject; others open sessions", seconds=10.0, probe="session", quick=True)
 async def sessions_of_one_subject(target: Target, report: Report) -> None:
     """Open sessions until they are refused, up to 1,000, while another subject opens one; then end them."""
     created = await _post_many(target, report, "/v1/sessions", {"motion": target.motion}, MAX_SESSIONS + 8)
@@ -74,7 +74,7 @@ async def sessions_of_one_subject(target: Target, report: Report) -> None:
         await asyncio.gather(*(fetch(target, "DELETE", f"/v1/sessions/{one}", token=token) for one in batch))
 
 
-@attack(11, "quota per subject; others create links", probe="share")
+@attack(11, "quota per subject; others create links", seconds=10.0, probe="share")
 async def links_of_one_subject(target: Target, report: Report) -> None:
     """Create 1,500 links, while another subject creates one; then revoke them."""
     created = await _post_many(target, report, "/v1/shares", {"motion": target.motion}, LINKS)
