@@ -62,7 +62,7 @@ async def _post_many(target: Target, report: Report, path: str, content: object,
     return created
 
 
-@attack(11, "quota per subject; others open sessions", seconds=10.0, probe="session", quick=True)
+@attack(11, "quota per subject; others open sessions", seconds=10.0, probe="session")
 async def sessions_of_one_subject(target: Target, report: Report) -> None:
     """Open sessions until they are refused, up to 1,000, while another subject opens one; then end them."""
     created = await _post_many(target, report, "/v1/sessions", {"motion": target.motion}, MAX_SESSIONS + 8)

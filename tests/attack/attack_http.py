@@ -265,7 +265,7 @@ async def pipelined_requests(target: Target, report: Report) -> None:
     await asyncio.gather(*(run(address) for address in range(1, 5)))
 
 
-@attack(3, "400 or 413, or closed; bounded memory", quick=True)
+@attack(3, "400 or 413, or closed; bounded memory")
 async def endless_chunk_framing(target: Target, report: Report) -> None:
     """Send chunk extensions, chunk sizes and trailers without end."""
     head = request(target, "POST", "/v1/solve", "Transfer-Encoding: chunked", token=target.tokens["view"])

@@ -44,7 +44,7 @@ async def cacheable_responses(target: Target, report: Report) -> None:
         ("GET", "/v1/motions", view), ("GET", f"/v1/motions/{motion}", view), ("GET", "/v1/sessions", view),
         ("GET", f"/v1/sessions/{target.session}", view), ("GET", "/v1/shares", control),
         ("GET", f"/v1/motions/{motion}/description", view), ("GET", f"/v1/motions/{motion}/blocks/0/0", view),
-        ("GET", "/v1/motions/none", view), ("GET", "/v1/nothing", view), ("GET", "/v1/motions", None),
+        ("GET", "/v1/motions/none", view), ("GET", "/v1/nothing", view),
         ("GET", "/v1/arms/393-351-256-560-320-120/table", view), ("HEAD", "/v1/motions", view),
         ("GET", "/v1/uploads/aaaaaaaaaa", target.tokens["ingest"]), ("POST", "/v1/tickets", view),
     ]  # fmt: skip

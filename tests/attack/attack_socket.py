@@ -269,7 +269,7 @@ async def reconnect_storm(target: Target, report: Report) -> None:
     await asyncio.gather(*(run(address) for address in range(1, 9)))
 
 
-@attack(2, f"{CALM}; closed with 4401 within 3 s", quick=True)
+@attack(2, f"{CALM}; closed with 4401 within 3 s")
 async def sockets_of_a_revoked_link(target: Target, report: Report) -> None:
     """Flood twenty streams that were opened with a share link, and revoke the link."""
     token = target.tokens["control"]

@@ -18,7 +18,7 @@ from tests.attack.inspect_storage import check_durability
 from tests.attack.inspection import Inspection, load_inspections
 from tests.attack.lab import Lab, open_lab
 from tests.attack.raw_socket import CLOSED, OPEN, RawSocket, frame
-from tests.attack.registry import Attack, Target, load_attacks
+from tests.attack.registry import Attack, Report, Target, load_attacks
 from tests.attack.resources import Resources
 from tests.attack.result import AttackResult
 from tests.attack.server import run_attacked_server
@@ -28,7 +28,11 @@ WINDOW_S = 0.3
 VIEWERS = 4
 MAX_GAP_RATIO = 12.0
 """Overlay gaps during an attack relative to calm ones: several times the bound of a full run, a tenth of a failure."""
+FIRST_ROW_OF_ANSWERS = 14
+"""From this row on quick attacks are single requests, whose answers count; they need no process."""
 QUICK_ATTACKS = [one for one in load_attacks().values() if one.is_quick]
+LOADS = [one for one in QUICK_ATTACKS if one.row < FIRST_ROW_OF_ANSWERS]
+REQUESTS = [one for one in QUICK_ATTACKS if one.row >= FIRST_ROW_OF_ANSWERS]
 QUICK_INSPECTIONS = [one for one in load_inspections().values() if one.is_quick]
 
 
@@ -38,7 +42,17 @@ def lab() -> Iterator[Lab]:
         yield opened
 
 
-@pytest.mark.parametrize("attack", QUICK_ATTACKS, ids=lambda one: one.name.replace(" ", "-"))
+@pytest.mark.parametrize("attack", REQUESTS, ids=lambda one: one.name.replace(" ", "-"))
+async def test_server_answers_as_specified(lab: Lab, attack: Attack) -> None:
+    report, server = Report(), lab.server
+    assert server is not None
+    logged = server.logged_bytes()
+    await attack.function(lab.make_target(SECONDS), report)
+    assert not report.violations, "\n".join(report.violations)
+    assert not server.tracebacks_since(logged)
+
+
+@pytest.mark.parametrize("attack", LOADS, ids=lambda one: one.name.replace(" ", "-"))
 def test_server_holds_against(lab: Lab, attack: Attack) -> None:
     result = lab.run(attack, SECONDS, MAX_GAP_RATIO, attempts=2)
     assert result.held, "\n".join(result.violations)
