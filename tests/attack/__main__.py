@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 
 from tests.attack.inspection import load_inspections
@@ -45,6 +46,8 @@ def main() -> None:
         for row, line in sorted(lines):
             print(f"{row:>2} {line}")
         return
+    # end the server as well if this process is terminated
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     results: list[AttackResult] = []
     if attacks:
         with open_lab(options.compose, options.viewers) as lab:

@@ -17,16 +17,11 @@ MAX_SESSIONS = 1_000
 """Sessions that one replica opens in total."""
 LINKS = 1_500
 HOSTILE_NAMES = {
-    "ESC": "a\x1b[2Jb",
-    "OSC": "a\x1b]0;owned\x07b",
-    "C1": "a\x9b2Jb",
-    "NUL": "a\0b",
+    "control characters": "a\x1b[2Jb\x1b]0;owned\x07c\x9b2Jd\0e\x7ff",
     "line breaks": "a\r\nb\u2028c\u2029d\x85e",
-    "right to left": "a\u202egnp.exe",
-    "isolates": "a\u2066b\u2067c\u2069d",
-    "zero width": "a\u200bb\u2060c\ufeffd",
-    "tags": "a" + "".join(chr(0xE0000 + ord(one)) for one in "hidden"),
-    "combining": "a" + "\u0301" * 200,
+    "bidirectional characters": "a\u202egnp.exe\u2066b\u2067c\u2069d\u200fe\u061cf",
+    "invisible characters": "a\u200bb\u2060c\ufeffd" + "".join(chr(0xE0000 + ord(one)) for one in "hidden"),
+    "combining characters": "a" + "\u0301" * 100,
 }
 """Names with characters that a terminal or a page may act on."""
 UNSAFE_CATEGORIES = ("Cc", "Cf", "Cs", "Zl", "Zp", "Cn")

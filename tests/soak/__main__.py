@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import asyncio
 import json
+import signal
 import sys
 import tempfile
 import time
@@ -164,6 +165,8 @@ def main() -> None:
     parser.add_argument("--kill-minutes", type=float, default=5.0, help="interval between kills")
     parser.add_argument("--max-gap-ms", type=float, default=MAX_GAP_P99_MS, help="limit of the overlay gap p99")
     options = parser.parse_args()
+    # end the replicas as well if this process is terminated
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     with tempfile.TemporaryDirectory(prefix="bunraku-soak-") as folder, run_replicas(Path(folder)) as replicas:
         figures = asyncio.run(Soak(options, replicas).run())
     print(json.dumps(figures))
