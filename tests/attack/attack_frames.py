@@ -8,7 +8,7 @@ import struct
 import time
 
 from bunraku.wire.messages import Ping
-from tests.attack.raw_socket import OPEN, connect_websocket, frame, handshake, open_socket
+from tests.attack.raw_socket import ANSWER_TIMEOUT_S, OPEN, connect_websocket, frame, handshake, open_socket
 from tests.attack.registry import Report, Target, attack
 
 BINARY, TEXT, CONTINUATION, CLOSE, PING, PONG = 2, 1, 0, 8, 9, 10
@@ -63,7 +63,7 @@ async def violations_of_the_protocol(target: Target, report: Report) -> None:
                 continue
             # the server may skip the frame: then a Close frame ends the connection
             await opened.send(data + frame(CLOSE) * (1000 in expected))
-            code = await opened.read_close_code(3.0)
+            code = await opened.read_close_code(ANSWER_TIMEOUT_S)
             report.count(str(code))
             kind = "control" if role == "control" else "stream"
             report.require(code in expected, f"{kind}: {name}: closed with {code}, expected {expected[0]}")
@@ -132,9 +132,9 @@ async def frames_before_the_handshake_is_answered(target: Target, report: Report
             if number % 3 == 0:
                 opened.reset()
                 continue
-            response = await opened.read_response(3.0)
+            response = await opened.read_response(ANSWER_TIMEOUT_S)
             report.count(str(response.status) if response else "no response")
-            code = await opened.read_close_code(3.0)
+            code = await opened.read_close_code(ANSWER_TIMEOUT_S)
             report.count(f"close {code}")
             report.require(code != 1011, f"{path}: closed with 1011")
             report.require(code is not None or opened.is_closed, f"{path}: the frames are never answered")
@@ -175,7 +175,7 @@ async def queries_out_of_range(target: Target, report: Report) -> None:
         for path, role in paths:
             async with open_socket(target, address=1 + number % 8) as opened:
                 await opened.send(handshake(target, f"{path}?{query}", target.tokens[role]))
-                response = await opened.read_response(5.0)
+                response = await opened.read_response(ANSWER_TIMEOUT_S)
                 if response is None:
                     report.count("no response")
                     report.require(False, f"{query[:40]}: no response")
@@ -184,7 +184,7 @@ async def queries_out_of_range(target: Target, report: Report) -> None:
                 report.require(response.status < 500, f"{query[:40]}: {response.status}")
                 if response.status == 101:
                     await opened.send(frame(CLOSE))
-                    code = await opened.read_close_code(5.0)
+                    code = await opened.read_close_code(ANSWER_TIMEOUT_S)
                     report.require(code != 1011, f"{query[:40]}: closed with 1011")
 
 

@@ -5,7 +5,16 @@ from __future__ import annotations
 import asyncio
 import time
 
-from tests.attack.raw_socket import CLOSED, OPEN, RawSocket, connect_websocket, handshake, open_socket, request
+from tests.attack.raw_socket import (
+    ANSWER_TIMEOUT_S,
+    CLOSED,
+    OPEN,
+    RawSocket,
+    connect_websocket,
+    handshake,
+    open_socket,
+    request,
+)
 from tests.attack.registry import Report, Target, attack
 
 HEADER_TIMEOUT_S = 12.0
@@ -132,7 +141,7 @@ async def large_headers_in_one_segment(target: Target, report: Report) -> None:
         ):
             async with open_socket(target) as opened:
                 await opened.send(data)
-                reaction = await opened.describe_reaction()
+                reaction = await opened.describe_reaction(ANSWER_TIMEOUT_S)
                 report.count(reaction)
                 report.require(reaction in ("400", "414", "431", CLOSED), f"{name} with {kilobytes} kB: {reaction}")
 
@@ -174,7 +183,7 @@ async def request_smuggling(target: Target, report: Report) -> None:
     for name, data in variants.items():
         async with open_socket(target) as opened:
             await opened.send(data + hidden)
-            first = await opened.read_response(3.0)
+            first = await opened.read_response(ANSWER_TIMEOUT_S)
             report.count(str(first.status) if first else "closed without an answer")
             second = await opened.read_response(1.5) if first is not None else None
             status = first.status if first else 400

@@ -22,6 +22,8 @@ MASK = b"\x37\xfa\x21\x3d"
 CLOSED = "closed without an answer"
 OPEN = "still open"
 MAX_KEPT_MESSAGES = 64
+ANSWER_TIMEOUT_S = 10.0
+"""Time for an answer that the server owes at once, seconds: long enough for a busy machine."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,7 @@ class RawSocket:
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\0\0\0\0\0\0\0")
         self._socket.close()
 
-    async def send(self, data: bytes, timeout_s: float = 5.0) -> bool:
+    async def send(self, data: bytes, timeout_s: float = ANSWER_TIMEOUT_S) -> bool:
         """Send bytes. Return False if the connection is closed, or if they are not accepted within the timeout."""
         if self.is_closed:
             return False
@@ -99,7 +101,7 @@ class RawSocket:
             return False
         return True
 
-    async def receive(self, timeout_s: float = 5.0, count: int = 65_536) -> bytes:
+    async def receive(self, timeout_s: float = ANSWER_TIMEOUT_S, count: int = 65_536) -> bytes:
         """Return the next bytes, none if the connection is closed or nothing arrives in time."""
         try:
             async with asyncio.timeout(timeout_s):
@@ -111,7 +113,7 @@ class RawSocket:
         self.is_closed = self.is_closed or not data
         return data
 
-    async def read_response(self, timeout_s: float = 5.0, max_bytes: int = 32 << 20) -> Response | None:
+    async def read_response(self, timeout_s: float = ANSWER_TIMEOUT_S, max_bytes: int = 32 << 20) -> Response | None:
         """Return the next response, interim ones skipped; None without a complete header within the timeout."""
         until = time.monotonic() + timeout_s
         while (end := self._received.find(b"\r\n\r\n")) < 0:
@@ -141,7 +143,7 @@ class RawSocket:
             return CLOSED if self.is_closed else OPEN
         return str(response.status)
 
-    async def read_close_code(self, timeout_s: float = 5.0) -> int | None:
+    async def read_close_code(self, timeout_s: float = ANSWER_TIMEOUT_S) -> int | None:
         """Read frames of the server until a Close frame and return its code; None without one.
 
         1005 stands for a Close frame without a code (RFC 6455, section 7.1.5).

@@ -52,6 +52,7 @@ async def test_server_answers_as_specified(lab: Lab, attack: Attack) -> None:
     assert not server.tracebacks_since(logged)
 
 
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("attack", LOADS, ids=lambda one: one.name.replace(" ", "-"))
 def test_server_holds_against(lab: Lab, attack: Attack) -> None:
     result = lab.run(attack, SECONDS, MAX_GAP_RATIO, attempts=2)
