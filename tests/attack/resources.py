@@ -70,14 +70,17 @@ class ResourceMeter:
 
 
 def find_service_processes() -> list[int]:
-    """Return the processes of this machine that run a service of Bunraku or its gateway, also in containers."""
+    """Return the processes of this machine that run a stack's services or its gateway, also those in containers.
+
+    The services of a stack listen on all addresses.
+    """
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().split(b"\0")
         except OSError:
             continue
-        is_service = b"up" in words and any(word.rpartition(b"/")[2] == b"bunraku" for word in words)
+        is_service = {b"up", b"0.0.0.0"} <= set(words) and any(word.rpartition(b"/")[2] == b"bunraku" for word in words)
         if is_service or words[0].rpartition(b"/")[2] == b"caddy":
             found.append(int(folder.name))
     # the init process of a container has the command of its child

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -19,7 +21,7 @@ from tests.attack.inspection import Inspection, load_inspections
 from tests.attack.lab import Lab, open_lab
 from tests.attack.raw_socket import CLOSED, OPEN, RawSocket, frame
 from tests.attack.registry import Attack, Report, Target, load_attacks
-from tests.attack.resources import Resources
+from tests.attack.resources import ResourceMeter, Resources, find_service_processes
 from tests.attack.result import AttackResult
 from tests.attack.server import run_attacked_server
 
@@ -119,6 +121,15 @@ def test_tracebacks_in_the_log_are_counted(tmp_path: Path) -> None:
         assert server.tracebacks_since(server.logged_bytes()) == []
         assert server.meter.measure().rss_mb > 10.0
     assert server.process.poll() is not None
+
+
+@pytest.mark.parametrize(("address", "is_found"), [("0.0.0.0", True), ("127.0.0.1", False)])
+def test_services_of_a_stack_are_found_by_their_command(address: str, is_found: bool) -> None:
+    command = [sys.executable, "-c", "input()", "/usr/bin/bunraku", "up", "--host", address, "--service", "ik"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+        assert (process.pid in find_service_processes()) == is_found
+        assert ResourceMeter(lambda: [process.pid]).measure().descriptors >= 3
+        process.communicate(b"\n")
 
 
 class OneReply:
