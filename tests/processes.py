@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-START_TIMEOUT_S = 30.0
+START_TIMEOUT_S = 120.0
 PORTS_PER_WORKER = 1_000
 """Number of ports of an xdist worker."""
 
