@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/v1 services/web/vite.config.ts services/web/vite.embed.config.ts services/web/vite.reference.config.ts proto/prior.json proto/constants.json -type f 2>/dev/null)
 
-.PHONY: package pictures test-nightly verify-compose help setup demo test lint test-python test-web vectors prior clean
+.PHONY: package pictures test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    install everything, start the server and open the demo   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -111,6 +111,15 @@ pictures: setup
 # fault tests of the Compose stack: needs Docker with Compose, about half an hour (ARGUMENTS=--rounds 1)
 verify-compose: setup
 	$(BIN)/python -m tests.verify $(ARGUMENTS)
+
+# hostile clients against a server with a secret, about half an hour (ARGUMENTS="--only pings,uploads", "--compose URL")
+verify-attack: setup
+	$(BIN)/python -m tests.attack $(ARGUMENTS)
+
+# replicas under load with kills, on real NATS and PostgreSQL (MINUTES=5 ARGUMENTS="--viewers 50")
+MINUTES ?= 60
+soak: setup
+	$(BIN)/python -m tests.soak --minutes $(MINUTES) $(ARGUMENTS)
 
 # benchmark the page in Chromium: 40 minutes, of which 30 measure memory (ARGUMENTS="--only arrival,axe", "--minutes 3")
 bench-page: setup

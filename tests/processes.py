@@ -19,7 +19,7 @@ from pathlib import Path
 
 import pytest
 
-START_TIMEOUT_S = 30.0
+START_TIMEOUT_S = 120.0
 PORTS_PER_WORKER = 1_000
 """Number of ports of an xdist worker."""
 
@@ -91,6 +91,11 @@ class ServerProcess:
         """Id of the running process."""
         assert self._process is not None
         return self._process.pid
+
+    @property
+    def is_running(self) -> bool:
+        """Whether the process has been started and has not ended."""
+        return self._process is not None and self._process.poll() is None
 
     def pause(self) -> None:
         """Pause the process and its children. Return when they have stopped."""

@@ -1,0 +1,159 @@
+"""Floods of control connections, and WebSockets that are flooded but never read: rows 2, 4 and 11."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from bunraku.wire.messages import Alive, Ask, Claim, Edit, Input, Ping, Release
+from tests.attack.attack_socket import BINARY, CALM, CLOSED_1008, MAX_WRITE_DEADLINE_S, PING, flood_and_read, repeat
+from tests.attack.raw_socket import connect_websocket, frame
+from tests.attack.registry import Report, Target, attack
+
+
+async def flood_control(target: Target, report: Report, make: Callable[[int], bytes], must_close: bool = False) -> None:
+    """Flood a control connection with the messages that `make` returns for successive numbers."""
+    messages = repeat(*(frame(BINARY, make(number)) for number in range(64)))
+    await flood_and_read(
+        target, report, target.control, messages, token=target.tokens["control"], must_close=must_close
+    )
+
+
+@attack(2, CLOSED_1008)
+async def ping_frames_on_a_control_connection(target: Target, report: Report) -> None:
+    """Flood a control connection with Ping frames."""
+    data = repeat(frame(PING))
+    await flood_and_read(target, report, target.control, data, token=target.tokens["control"])
+
+
+@attack(2, CLOSED_1008)
+async def unknown_messages_on_a_control_connection(target: Target, report: Report) -> None:
+    """Flood a control connection with messages of unknown types."""
+    await flood_control(target, report, lambda _: b"\xc8", must_close=True)
+
+
+@attack(2, CALM)
+async def clock_pings_on_a_control_connection(target: Target, report: Report) -> None:
+    """Flood a control connection with clock messages."""
+    await flood_control(target, report, lambda number: Ping(number, number).pack())
+
+
+@attack(2, CALM)
+async def claims_and_releases(target: Target, report: Report) -> None:
+    """Flood a control connection with claims and releases of all limbs."""
+    await flood_control(
+        target, report, lambda number: (Release(number % 16, 1) if number & 1 else Claim(number % 16)).pack()
+    )
+
+
+@attack(2, CALM)
+async def requests_for_a_held_limb(target: Target, report: Report) -> None:
+    """Flood a control connection with requests for a held limb and their withdrawals."""
+    await flood_control(target, report, lambda number: Ask(0, bool(number & 1)).pack())
+
+
+@attack(2, CALM)
+async def keep_alive_messages(target: Target, report: Report) -> None:
+    """Flood a control connection with keep-alive messages for all limbs."""
+    await flood_control(target, report, lambda _: Alive(list(range(16))).pack())
+
+
+@attack(2, CALM)
+async def inputs_for_a_held_limb(target: Target, report: Report) -> None:
+    """Flood a control connection with inputs for a limb that another puppeteer holds."""
+    await flood_control(target, report, lambda number: Input(0, 1, 1, number, number, (0.4, 0.1, 0.4)).pack())
+
+
+@attack(2, CALM)
+async def inputs_of_eight_puppeteers(target: Target, report: Report) -> None:
+    """Flood eight control connections with inputs and claims."""
+
+    def make(number: int) -> bytes:
+        return Input(number % 16, 0, 1, number, 0, (1.0, -1.0, 1.0)).pack() if number % 4 else Claim(3).pack()
+
+    await asyncio.gather(*(flood_control(target, report, make) for _ in range(8)))
+
+
+@attack(2, CALM)
+async def puppeteers_that_join_and_leave(target: Target, report: Report) -> None:
+    """Join and leave with long names as fast as possible, so that the server notifies every viewer."""
+    name = "%F0%9F%91%BE" * 200
+
+    async def run(address: int) -> None:
+        until = time.monotonic() + target.seconds
+        while time.monotonic() < until:
+            opened = await connect_websocket(
+                target, f"{target.control}?name={name}", target.tokens["control"], address=address
+            )
+            if opened is not None:
+                await opened.receive(0.5)
+                opened.reset()
+            report.count("refused" if opened is None else "joined")
+
+    await asyncio.gather(*(run(address) for address in range(1, 9)))
+
+
+@attack(4, f"{CALM}; output bounded, aborted after a write deadline", seconds=MAX_WRITE_DEADLINE_S)
+async def pings_on_control_without_reading(target: Target, report: Report) -> None:
+    """Send full Ping frames on a control connection and never read the answers."""
+    await _flood_without_reading(target, report, target.control, "control", repeat(frame(PING, bytes(125))))
+
+
+@attack(4, f"{CALM}; output bounded, aborted after a write deadline", seconds=MAX_WRITE_DEADLINE_S)
+async def clock_pings_on_control_without_reading(target: Target, report: Report) -> None:
+    """Send clock messages at the permitted rate on eight control connections and never read the answers."""
+    data = frame(BINARY, Ping(1, 2).pack()) * 30
+
+    async def run() -> None:
+        opened = await connect_websocket(target, target.control, target.tokens["control"], receive_buffer_bytes=4_096)
+        if opened is None:
+            report.count("refused")
+            return
+        until = time.monotonic() + target.seconds
+        while time.monotonic() < until and not opened.is_closed:
+            await opened.send(data, 0.1)
+            await asyncio.sleep(0.1)
+        report.count("aborted" if opened.is_closed else "still open")
+        opened.close()
+
+    await asyncio.gather(*(run() for _ in range(8)))
+    _require_aborted(target, report)
+
+
+@attack(4, f"{CALM}; output bounded, aborted after a write deadline", seconds=MAX_WRITE_DEADLINE_S)
+async def edits_without_reading(target: Target, report: Report) -> None:
+    """Seek on a private timeline and never read the blocks."""
+    edits = b"".join(frame(BINARY, Edit(position=number * 50_000).pack()) for number in range(20))
+    await _flood_without_reading(target, report, target.motion_stream, "view", edits)
+
+
+@attack(11, "others can still control the session", probe="control", quick=True)
+async def silent_puppeteers(target: Target, report: Report) -> None:
+    """Take all places of a session with puppeteers that never read, while another subject wants to join."""
+    opened = [
+        await connect_websocket(target, target.control, target.tokens["control"], receive_buffer_bytes=4_096)
+        for _ in range(40)
+    ]
+    report.count("opened", sum(one is not None for one in opened))
+    await report.reach_peak()
+    for one in opened:
+        if one is not None:
+            one.close()
+
+
+async def _flood_without_reading(target: Target, report: Report, path: str, role: str, data: bytes) -> None:
+    opened = await connect_websocket(target, path, target.tokens[role], receive_buffer_bytes=4_096)
+    assert opened is not None
+    until = time.monotonic() + target.seconds
+    while time.monotonic() < until and not opened.is_closed:
+        await opened.send(data, 1.0)
+        await asyncio.sleep(0.01)
+    report.count("aborted" if opened.is_closed else "still open")
+    opened.close()
+    _require_aborted(target, report)
+
+
+def _require_aborted(target: Target, report: Report) -> None:
+    if target.seconds >= MAX_WRITE_DEADLINE_S:
+        report.require(not report.answers["still open"], f"a connection is open after {MAX_WRITE_DEADLINE_S:g} s")
