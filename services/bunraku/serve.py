@@ -30,9 +30,9 @@ from bunraku.http.access_control import requires
 from bunraku.http.access_log import AccessLogMiddleware
 from bunraku.http.authorization import AuthorizationMiddleware, add_security_scheme, collect_route_rules
 from bunraku.http.cors import CorsMiddleware
-from bunraku.http.header_timeout import MAX_HEADER_BYTES, HeaderTimeoutProtocol
 from bunraku.http.origin import parse_origins
 from bunraku.http.problem_details import install_problem_handlers
+from bunraku.http.protocol import HttpProtocol
 from bunraku.page_files import create_page_app
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
@@ -153,8 +153,7 @@ def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -
 def uvicorn_protocol_options() -> dict[str, Any]:
     """Return uvicorn's options for the HTTP and WebSocket protocols."""
     return {
-        "http": HeaderTimeoutProtocol,
-        "h11_max_incomplete_event_size": MAX_HEADER_BYTES,
+        "http": HttpProtocol,
         "ws": HandoffProtocol,
         "ws_max_size": MAX_CLIENT_MESSAGE_BYTES,
         "ws_per_message_deflate": False,

@@ -182,7 +182,7 @@ async def measure_live(bench: BenchContext) -> Figures:
                     ),
                 )
                 wrong_clock = bench.create_viewer(
-                    fars[2], path, now=lambda: round(time.monotonic_ns() * 1.0002e-3) + 3_600_000_000
+                    fars[2], path, local_clock=lambda: round(time.monotonic_ns() * 1.0002e-3) + 3_600_000_000
                 )
                 transferred = 0
 

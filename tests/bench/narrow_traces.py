@@ -31,7 +31,7 @@ async def measure_traces(bench: BenchContext, seconds: float, *link_names: str) 
                 bench.create_motion_viewer(far, "?tracks=motion" if nth < len(links) else "?tracks=motion&rate=0")
                 for nth, far in enumerate(fars)
             ]
-            await asyncio.gather(*(viewer.watch_and_measure(seconds, frame=1 / 15) for viewer in viewers))
+            await asyncio.gather(*(viewer.watch_and_measure(seconds, frame_interval=1 / 15) for viewer in viewers))
         adaptive, lowest = viewers[: len(links)], viewers[len(links) :]
         watched = seconds * 1e3 * len(links)
         adaptive_ms, lowest_ms = (sum(_blank_ms(viewer, seconds) for viewer in group) for group in (adaptive, lowest))

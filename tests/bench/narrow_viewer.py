@@ -13,6 +13,8 @@ from websockets.asyncio.client import connect
 from bunraku.client import StreamEnded, Viewer
 from bunraku.client.api import Client
 from bunraku.client.puppeteer import Puppeteer
+from bunraku.client.reconnecting_connection import SILENCE_TIMEOUT_S
+from bunraku.client.viewer import FRAME_INTERVAL_S
 from bunraku.playout.clock import ClockSample
 from bunraku.wire.limbs import LIMBS
 from bunraku.wire.messages import MAX_SERVER_MESSAGE_BYTES, SUBPROTOCOL, Ping, Pong, unpack
@@ -30,9 +32,22 @@ Figures = dict[str, Any]
 class MeasuringViewer(Viewer):
     """Viewer that records the arrival of messages and the state at each picture."""
 
-    def __init__(self, url: str, far: FarEnd | None = None, truth: float = 0.0, **options: Any) -> None:
+    def __init__(
+        self,
+        url: str,
+        far: FarEnd | None = None,
+        truth: float = 0.0,
+        *,
+        local_clock: Callable[[], int] | None = None,
+        silence_timeout: float = SILENCE_TIMEOUT_S,
+    ) -> None:
         """`truth` is the server's clock minus the monotonic clock of this machine, microseconds."""
-        super().__init__(url, open_socket=far.open_socket if far else None, **options)
+        super().__init__(
+            url,
+            local_clock=local_clock,
+            silence_timeout=silence_timeout,
+            open_socket=far.open_socket if far else None,
+        )
         self.true_clock_offset_us = truth
         self.overlay_arrivals: list[tuple[int, float, int]] = []
         """Arrival time of each overlay, its age since its newest frame was computed (ms), and its number of frames."""
@@ -55,7 +70,7 @@ class MeasuringViewer(Viewer):
             )
         super()._on_message(data)
 
-    async def watch_and_measure(self, seconds: float, **options: Any) -> None:
+    async def watch_and_measure(self, seconds: float, frame_interval: float = FRAME_INTERVAL_S) -> None:
         """Watch for `seconds` and record the clock error and the shown block at each picture."""
 
         def record_picture(reference: int, _: Any) -> None:
@@ -68,7 +83,7 @@ class MeasuringViewer(Viewer):
         self.started_us = time.monotonic_ns() // 1000
         while (left := seconds - (time.monotonic_ns() // 1000 - self.started_us) / 1e6) > 0.5:
             try:
-                await self.watch(left, record_picture, **options)
+                await self.watch(left, record_picture, frame_interval=frame_interval)
             except StreamEnded as ended:
                 print(f"a stream ended: {ended}")
                 self.statistics.gaps += 1
@@ -90,13 +105,14 @@ class BenchContext:
     def __init__(self, network: EmulatedNetwork, url: str, motion: str, truth: float) -> None:
         self.network, self.url, self.motion, self.true_clock_offset_us = network, url, motion, truth
 
-    def create_viewer(self, far: FarEnd, path: str, **options: Any) -> MeasuringViewer:
+    def create_viewer(self, far: FarEnd, path: str, *, local_clock: Callable[[], int] | None = None) -> MeasuringViewer:
         """Create a viewer at a far end."""
-        return MeasuringViewer(f"ws://{far.host}:{SERVER_PORT}{path}", far, self.true_clock_offset_us, **options)
+        url = f"ws://{far.host}:{SERVER_PORT}{path}"
+        return MeasuringViewer(url, far, self.true_clock_offset_us, local_clock=local_clock)
 
-    def create_motion_viewer(self, far: FarEnd, query: str = "", **options: Any) -> MeasuringViewer:
+    def create_motion_viewer(self, far: FarEnd, query: str = "") -> MeasuringViewer:
         """Create a viewer of the motion."""
-        return self.create_viewer(far, f"/v1/motions/{self.motion}/stream{query}", **options)
+        return self.create_viewer(far, f"/v1/motions/{self.motion}/stream{query}")
 
     async def run_controlled(self, work: Callable[[str], Awaitable[None]], angular_speed: float = 2.0) -> None:
         """Run `work` with the id of a session while all four limbs of its performer are controlled.

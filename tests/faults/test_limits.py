@@ -20,7 +20,7 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.typing import Origin, Subprotocol
 
-from bunraku.http import header_timeout
+from bunraku.http import protocol
 from bunraku.http.access_control import Role
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, SUBPROTOCOL
 from tests.credentials import SECRET, bearer_headers, make_token
@@ -33,7 +33,7 @@ TIMEOUT_S = 30
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     options: dict[str, Any] = {"secret": SECRET, "connects": 20.0, "body_seconds": 1.0, "quota_motions": 2}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(header_timeout, "HEADER_TIMEOUT_S", 1.0)
+        patch.setattr(protocol, "HEADER_TIMEOUT_S", 1.0)
         with run_server(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **options) as url:
             yield url
 

@@ -15,7 +15,7 @@ import pytest
 from bunraku.client import Client, Puppeteer
 from bunraku.client.load_generator import LoadGenerator
 from bunraku.messaging.bus import MemoryBus
-from bunraku.stream import heartbeat
+from bunraku.websocket import heartbeat
 from bunraku.wire.overlay import Overlay
 from tests.raw_client import upgrade_request
 

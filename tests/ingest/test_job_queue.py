@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -165,3 +166,21 @@ async def test_job_of_an_unknown_kind_is_given_up(context: ServiceContext) -> No
     await wait_until_empty(context)
     assert replica.handled_jobs == []
     await replica.stop()
+
+
+async def test_job_is_judged_by_the_observers_clock_alone(context: ServiceContext, source: Path) -> None:
+    """A holder whose clock is an hour behind keeps its job; one whose clock is an hour ahead loses it when it fails."""
+    behind = dataclasses.replace(context, clock=lambda: context.clock() - 3_600_000_000)
+    ahead = dataclasses.replace(context, clock=lambda: context.clock() + 3_600_000_000)
+    holder, other = QueueReplica(behind), QueueReplica(context)
+    async with holder.queue.persist_job(JOB, source):
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(1.5):
+                await other.first_job_handled.wait()
+    await holder.stop()
+    await context.motion_store.put_source("j1", b"uploaded bytes")
+    await context.catalogue.add_job(Job("j1", 1, DETAILS), "failed", ahead.clock() + TIMING.lease_us)
+    async with asyncio.timeout(20):
+        await other.first_job_handled.wait()
+    await wait_until_empty(context)
+    await other.stop()

@@ -6,9 +6,12 @@ from contextlib import AsyncExitStack
 import pytest
 
 from bunraku.messaging.key_value import MemoryKeyValueStore
-from bunraku.messaging.lease import LeaseTiming, hold_lease
+from bunraku.messaging.lease import hold_lease
+from bunraku.messaging.replica_registry import ReplicaRegistry, ReplicaTiming
+from bunraku.runtime.availability import BackendUnavailable
 
-TIMING = LeaseTiming(heartbeat_s=0.05, timeout_s=0.5, poll_s=0.01)
+TIMING = ReplicaTiming(heartbeat_s=0.05, timeout_s=0.5)
+POLL_S = 0.01
 
 
 async def test_holders_take_turns() -> None:
@@ -17,7 +20,7 @@ async def test_holders_take_turns() -> None:
 
     async def work(number: int) -> None:
         nonlocal active, max_active
-        async with hold_lease(store, "work", TIMING):
+        async with hold_lease(store, "work", TIMING, POLL_S):
             active += 1
             max_active = max(max_active, active)
             # long enough for others to try
@@ -29,33 +32,50 @@ async def test_holders_take_turns() -> None:
         await asyncio.gather(*map(work, range(5)))
     assert sorted(finished) == list(range(5))
     assert max_active == 1
-    assert await store.get("work") is None
+    assert store.watch().entries == {}
 
 
-async def test_renewed_lease_outlasts_its_timeout() -> None:
+async def test_held_lease_outlasts_its_timeout() -> None:
     store = MemoryKeyValueStore()
     async with AsyncExitStack() as stack:
-        await stack.enter_async_context(hold_lease(store, "work", TIMING))
+        await stack.enter_async_context(hold_lease(store, "work", TIMING, POLL_S))
         with pytest.raises(TimeoutError):
-            async with asyncio.timeout(1.5), hold_lease(store, "work", TIMING):
+            async with asyncio.timeout(1.5), hold_lease(store, "work", TIMING, POLL_S):
                 pytest.fail("two holders at once")
-    async with asyncio.timeout(20), hold_lease(store, "work", TIMING):
+    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
         pass
 
 
-async def test_abandoned_lease_is_taken_after_its_timeout() -> None:
-    store, now = MemoryKeyValueStore(), 0.0
-
-    def clock() -> float:
-        nonlocal now
-        now += 1.0
-        return now
-
-    await store.put("work", b"of a dead holder", 0)
-    timing = LeaseTiming(heartbeat_s=0.05, timeout_s=5.0, poll_s=0.0, clock=clock)
-    async with asyncio.timeout(20), hold_lease(store, "work", timing):
+@pytest.mark.parametrize("holder", [b"dead", b"\xff\x00 token of an earlier release"])
+async def test_abandoned_lease_is_taken(holder: bytes) -> None:
+    store = MemoryKeyValueStore()
+    await store.put("work", holder, 0)
+    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
         entry = await store.get("work")
         assert entry is not None
-        assert entry.value != b"of a dead holder"
-    # one reading at the start, one at the first sight of the revision, then more than 5 s without a change
-    assert now == 8.0
+        assert entry.value != holder
+
+
+async def test_lease_whose_release_failed_ends_with_its_holder(monkeypatch: pytest.MonkeyPatch) -> None:
+    store = MemoryKeyValueStore()
+    remove = store.remove
+
+    async def fail(key: str, revision: int | None = None) -> None:
+        if key == "work":
+            raise BackendUnavailable("the register", "no answer")
+        await remove(key, revision)
+
+    async with hold_lease(store, "work", TIMING, POLL_S):
+        monkeypatch.setattr(store, "remove", fail)
+    assert await store.get("work") is not None
+    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
+        pass
+
+
+async def test_lease_of_a_stalled_holder_is_taken_after_the_timeout() -> None:
+    store, loop = MemoryKeyValueStore(), asyncio.get_running_loop()
+    holder = ReplicaRegistry(store, TIMING)
+    await store.put("work", (await holder.register()).encode(), 0)
+    begin = loop.time()
+    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
+        assert loop.time() - begin > TIMING.timeout_s

@@ -5,7 +5,9 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from bunraku.client import Client
+from bunraku.client import Client, ControlRefused, Puppeteer, ServerProblem
+from bunraku.session import puppeteer_roster
+from tests.credentials import SECRET, make_token
 from tests.servers import make_bvh_clip, run_server
 
 
@@ -69,3 +71,26 @@ async def test_invalid_edit_changes_nothing(server: str, clip_file: Path) -> Non
             assert (await http.patch(path, json=body)).status_code in (404, 422)
         assert (await http.get(path)).json() == session
         assert (await http.patch("/v1/sessions/none", json={"playing": True})).status_code == 404
+
+
+async def test_sessions_and_puppeteers_are_limited_by_the_subject_of_the_token(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS_PER_SUBJECT", 1)
+    source = tmp_path / "one.bvh"
+    source.write_bytes(make_bvh_clip(2.0, 1))
+    aiko, ben = (make_token(subject=name) for name in ("aiko", "ben"))
+    with run_server(tmp_path / "data", secret=SECRET, quota_sessions=2) as url:
+        async with Client(url, token=aiko) as client, Client(url, token=ben) as other:
+            motion = (await client.upload(source))["id"]
+            session, _ = [(await client.open_session(motion))["id"] for _ in range(2)]
+            with pytest.raises(ServerProblem, match="2 open sessions") as refused:
+                await client.open_session(motion)
+            assert refused.value.status == 403
+            await other.open_session(motion)
+            async with Puppeteer(client, session, "Aiko"):
+                with pytest.raises(ControlRefused, match="1 puppeteers with this link"):
+                    async with Puppeteer(client, session, "Another name"):
+                        pytest.fail("joined twice")
+                async with Puppeteer(other, session, "Ben"):
+                    assert len((await client.session(session))["puppeteers"]) == 2

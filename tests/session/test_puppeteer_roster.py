@@ -36,3 +36,25 @@ def test_puppeteers_may_leave_during_iteration() -> None:
     for puppeteer in roster:
         roster.leave(puppeteer)
     assert len(roster) == 0
+
+
+def test_one_subject_gets_a_part_of_the_places(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS", 4)
+    monkeypatch.setattr(puppeteer_roster, "MAX_PUPPETEERS_PER_SUBJECT", 2)
+    roster = PuppeteerRoster()
+    first, _ = (roster.join(name, name, print, 0, "") for name in "ab")
+    with pytest.raises(SessionFull, match="2 puppeteers with this link"):
+        roster.join("c", "c", print, 0, "")
+    roster.join("d", "d", print, 0, "aiko")
+    roster.leave(first)
+    roster.join("e", "e", print, 0, "")
+    roster.join("f", "f", print, 0, "ben")
+    with pytest.raises(SessionFull, match="4"):
+        roster.join("g", "g", print, 0, "ben")
+
+
+def test_server_without_access_control_has_no_subjects() -> None:
+    roster = PuppeteerRoster()
+    for number in range(puppeteer_roster.MAX_PUPPETEERS):
+        roster.join(str(number), "a", print, 0)
+    assert len(roster) > puppeteer_roster.MAX_PUPPETEERS_PER_SUBJECT

@@ -9,16 +9,16 @@ import pytest
 
 from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
+from bunraku.messaging.replica_registry import ReplicaTiming
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.session import session_manager
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import Claim, Grant, Presence, TimelineState, Welcome, unpack
 from bunraku.wire.overlay import Overlay
+from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.vectors.blocks import random_motion
 
 MOTIONS = ("one", "two")
@@ -33,17 +33,14 @@ async def context(tmp_path: Path) -> AsyncIterator[ServiceContext]:
         yield opened
 
 
-@pytest.fixture(autouse=True)
-def _short_timeouts(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(session_manager, "HEARTBEAT_INTERVAL_S", 0.1)
-    monkeypatch.setattr(session_manager, "REPLICA_TIMEOUT_S", 0.5)
+TIMING = ReplicaTiming(heartbeat_s=0.1, timeout_s=0.5)
 
 
 class Replica:
     """Session manager of a replica, which can be closed or killed."""
 
-    def __init__(self, context: ServiceContext) -> None:
-        self.sessions = SessionManager(context)
+    def __init__(self, context: ServiceContext, timing: ReplicaTiming = TIMING) -> None:
+        self.sessions = SessionManager(context, timing)
         self._running = asyncio.create_task(self.sessions.run())
 
     async def close(self) -> None:
@@ -88,14 +85,14 @@ class SessionMessages:
         return found[0]
 
 
-async def join_session(context: ServiceContext, stage: StageProxy, name: str) -> PuppeteerConnection:
-    connection = PuppeteerConnection()
+async def join_session(context: ServiceContext, stage: StageProxy, name: str) -> RecordingPuppeteer:
+    connection = RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     await stage.join(connection, name)
     return connection
 
 
-def received(connection: PuppeteerConnection, kind: type) -> list[object]:
+def received(connection: RecordingPuppeteer, kind: type) -> list[object]:
     return [message for message in map(unpack, connection.queued) if isinstance(message, kind)]
 
 
@@ -157,11 +154,8 @@ async def test_replica_takes_over_sessions_of_a_dead_replica(context: ServiceCon
     assert surviving.sessions.counters.sessions == {("opened",): 0, ("taken over",): 1, ("handed on",): 0}
 
 
-async def test_closing_replica_hands_over_its_sessions_at_once(
-    context: ServiceContext, replicas: list[Replica], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(session_manager, "REPLICA_TIMEOUT_S", 1000.0)
-    ending, staying = replicas
+async def test_closing_replica_hands_over_its_sessions_at_once(context: ServiceContext) -> None:
+    ending, staying = (Replica(context, ReplicaTiming(heartbeat_s=0.1, timeout_s=1000.0)) for _ in range(2))
     opened = await ending.sessions.open_session("one")
     published = SessionMessages(context, opened["id"])
     ben = await join_session(context, staying.sessions.stage_proxy(opened["id"]), "Ben")
@@ -170,9 +164,26 @@ async def test_closing_replica_hands_over_its_sessions_at_once(
     await published.wait_for(TimelineState)
     assert (await staying.sessions.stage_proxy(opened["id"]).describe())["motion"] == "one"
     assert ending.sessions.counters.sessions["handed on",] == staying.sessions.counters.sessions["taken over",] == 1
+    await staying.close()
 
 
-async def test_stalled_replica_gives_up_sessions_that_were_taken_over(
+async def test_resumed_replica_closes_stages_that_were_taken_over(
+    context: ServiceContext, replicas: list[Replica]
+) -> None:
+    stalled, surviving = replicas
+    opened = await stalled.sessions.open_session("one")
+    published = SessionMessages(context, opened["id"])
+    endpoint = stalled.sessions._endpoints[opened["id"]]
+    stalled._running.cancel()
+    await asyncio.wait((stalled._running,))
+    await published.wait_for(TimelineState)
+    stalled._running = asyncio.create_task(stalled.sessions.run())
+    await asyncio.wait((endpoint.stage._tick_task,))
+    assert opened["id"] not in stalled.sessions._endpoints
+    assert (await surviving.sessions.stage_proxy(opened["id"]).describe())["id"] == opened["id"]
+
+
+async def test_edit_at_a_replica_that_lost_the_session_is_refused(
     context: ServiceContext, replicas: list[Replica]
 ) -> None:
     stalled, surviving = replicas
@@ -184,9 +195,6 @@ async def test_stalled_replica_gives_up_sessions_that_were_taken_over(
     with pytest.raises(ProblemError) as refused:
         await stalled.sessions.save_record(stalled.sessions._endpoints[opened["id"]].stage)
     assert refused.value.status == 503
-    endpoint = stalled.sessions._endpoints[opened["id"]]
-    stalled._running = asyncio.create_task(stalled.sessions.run())
-    await asyncio.wait((endpoint.stage._tick_task,))
     assert (await surviving.sessions.stage_proxy(opened["id"]).describe())["id"] == opened["id"]
     assert opened["id"] not in stalled.sessions._endpoints
 

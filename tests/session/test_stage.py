@@ -24,7 +24,14 @@ from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
-from bunraku.session.stage import EDIT_LEAD_US, FRAME_INTERVAL_US, FRAMES_PER_MESSAGE, SessionStart, Stage
+from bunraku.session.stage import (
+    EDIT_LEAD_US,
+    FRAME_INTERVAL_US,
+    FRAMES_PER_MESSAGE,
+    PRESENCE_BURST,
+    SessionStart,
+    Stage,
+)
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
     Alive,
@@ -224,6 +231,37 @@ async def test_released_limb_is_granted_to_the_first_who_asked(stage: Stage, bus
     assert [ben.id] in [p.asks[1] for p in presences]
     stage.leave(ben.puppeteer)
     assert stage.presence.limbs[1] is None
+
+
+async def test_subject_has_one_place_among_those_who_ask_for_a_limb(stage: Stage) -> None:
+    aiko = join_stage(stage, "Aiko")
+    stage.receive(aiko.puppeteer, Claim(1))
+    names: list[Puppeteer] = [stage.join(f"name {n}", "Someone", lambda _: None, "one link") for n in range(5)]
+    ben = stage.join("ben", "Ben", lambda _: None, "another link")
+    for puppeteer in (*names, ben, *names):
+        stage.receive(puppeteer, Ask(1, True))
+    assert stage.presence.asks[1] == [names[0].id, ben.id]
+    # the place is free again when its holder no longer asks
+    stage.receive(names[0], Ask(1, False))
+    stage.receive(names[1], Ask(1, True))
+    stage.receive(names[1], Ask(99, True))
+    assert stage.presence.asks[1] == [ben.id, names[1].id]
+
+
+async def test_flood_of_changes_is_published_at_a_limited_rate(stage: Stage, bus: MemoryBus) -> None:
+    audience = StageMessages(bus)
+    aiko = join_stage(stage, "Aiko")
+    for _ in range(500):
+        stage.receive(aiko.puppeteer, Claim(1))
+        stage.receive(aiko.puppeteer, Release(1, last_grant(aiko).epoch))
+    stage.receive(aiko.puppeteer, Claim(2))
+    presences = [m for m in audience.messages if isinstance(m, Presence)]
+    assert len(presences) < 2 * PRESENCE_BURST
+    # the last change is published too
+    async with asyncio.timeout(10):
+        while presences[-1].limbs != stage.presence.limbs:
+            presences = [m for m in audience.messages if isinstance(m, Presence)]
+            await asyncio.sleep(0.01)
 
 
 @pytest.mark.parametrize("message", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])

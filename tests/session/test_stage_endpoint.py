@@ -14,12 +14,13 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
+from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
 from bunraku.wire.messages import Claim
+from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.vectors.blocks import random_motion
 
 
@@ -64,8 +65,10 @@ async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncItera
     await opened.close()
 
 
-async def join_stage(context: ServiceContext, name: str) -> tuple[StageProxy, PuppeteerConnection]:
-    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+async def join_stage(
+    context: ServiceContext, name: str, subject: str | None = None
+) -> tuple[StageProxy, RecordingPuppeteer]:
+    stage, connection = StageProxy("s", context.bus, context.key_values, subject), RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     await stage.join(connection, name)
     return stage, connection
@@ -93,7 +96,7 @@ async def test_join_of_a_full_stage_gives_503(context: ServiceContext, monkeypat
 
 @pytest.mark.usefixtures("endpoint")
 async def test_unknown_puppeteer_is_notified(context: ServiceContext) -> None:
-    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+    stage, connection = StageProxy("s", context.bus, context.key_values), RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     stage.send(connection, None)
     assert not connection.is_unknown
@@ -123,3 +126,46 @@ async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, e
 async def test_answers_are_plain_values(context: ServiceContext) -> None:
     answer = msgpack.unpackb(await context.bus.request("session.s.describe", msgpack.packb(None)))
     assert answer["answer"]["id"] == "s"
+
+
+async def test_viewers_of_a_dead_stream_replica_no_longer_count(
+    context: ServiceContext, endpoint: StageEndpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage_endpoint, "PUPPETEER_HEARTBEAT_S", 0.02)
+    monkeypatch.setattr(stage_endpoint, "VIEWER_COUNT_TIMEOUT_US", 200_000)
+    stage, dead = StageProxy("s", context.bus, context.key_values), msgpack.packb(["dead", 3])
+    context.bus.publish("session.s.viewers", dead)
+    assert (await stage.describe())["viewers"] == 3
+    async with asyncio.timeout(20):
+        while (await stage.describe())["viewers"] != 2:
+            context.bus.publish("session.s.viewers", msgpack.packb(["living", 2]))
+            await asyncio.sleep(0.01)
+        while (await stage.describe())["viewers"] != 0:  # noqa: ASYNC110
+            await asyncio.sleep(0.01)
+    # nobody is left, so that the session can be ended as idle
+    assert endpoint.stage.is_idle(context.clock() + 1_000_000, 1_000_000)
+
+
+def test_viewer_counts_are_reported_more_often_than_they_expire() -> None:
+    assert stage_endpoint.VIEWER_COUNT_TIMEOUT_US > 3e6 * VIEWER_COUNT_REFRESH_S
+
+
+@pytest.mark.usefixtures("endpoint")
+async def test_joins_of_one_subject_are_limited(context: ServiceContext) -> None:
+    for _ in range(stage_endpoint.JOIN_BURST):
+        stage, connection = await join_stage(context, "flooder", "one link")
+        stage.send(connection, None)
+    with pytest.raises(ProblemError, match="too often") as refused:
+        await join_stage(context, "flooder", "one link")
+    assert refused.value.status == 429
+    await join_stage(context, "other", "another link")
+    # a server without access control has no subjects
+    for _ in range(2 * stage_endpoint.JOIN_BURST):
+        stage, connection = await join_stage(context, "someone")
+        stage.send(connection, None)
+
+
+async def test_join_of_a_replica_of_an_earlier_release(context: ServiceContext, endpoint: StageEndpoint) -> None:
+    answer = await context.bus.request("session.s.join", msgpack.packb(["p1", "Aiko"]))
+    assert msgpack.unpackb(answer) == {"answer": {"colour": 0}}
+    assert [puppeteer.id for puppeteer in endpoint.stage.puppeteers] == ["p1"]

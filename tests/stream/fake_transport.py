@@ -43,6 +43,10 @@ class FakeTransport(asyncio.Transport):
         if first:
             self.protocol.pause_writing()
 
+    def pause_reading(self) -> None: ...
+
+    def resume_reading(self) -> None: ...
+
     def drain(self) -> None:
         """Restore the capacity and send the unsent data."""
         self.has_capacity = True

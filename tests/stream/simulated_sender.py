@@ -30,7 +30,7 @@ class SimulatedSender:
     def probe(self, _: int) -> bytes:
         return b""
 
-    def receive_probe_echo(self, payload: bytes) -> None: ...
+    def receive_probe_echo(self, payload: bytes) -> bool: ...
 
     def set_corked(self, corked: bool) -> None:
         assert not corked

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 from typing import cast
 
 from bunraku.stream.flow_control import FlowControl, LinkState
-from bunraku.stream.heartbeat import (
+from bunraku.stream.quiet_period import (
     INITIAL_QUIET_PERIODS,
     MAX_QUIET_PERIOD_US,
     QUIET_INTERVAL_US,

@@ -53,7 +53,7 @@ class ConstrainedTransport(FakeTransport):
     def probe(self, _: int) -> bytes:
         return b""
 
-    def receive_probe_echo(self, payload: bytes) -> None: ...
+    def receive_probe_echo(self, payload: bytes) -> bool: ...
 
     def set_corked(self, corked: bool) -> None:
         self.cork_calls.append(corked)

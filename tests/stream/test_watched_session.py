@@ -111,6 +111,24 @@ async def test_viewer_counts_are_throttled(motion_store: MotionStore, monkeypatc
     assert counts[-1] == 0
 
 
+async def test_unchanged_viewer_count_is_published_again(
+    motion_store: MotionStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watched_session, "VIEWER_COUNT_REFRESH_S", 0.02)
+    bus = MemoryBus()
+    counts = serve_session_state(bus)
+    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    viewer, _ = await join_viewer(watched)
+    session = watched._sessions["s"]
+    async with asyncio.timeout(10):
+        while counts[-4:] != [1] * 4:  # noqa: ASYNC110
+            await asyncio.sleep(0.001)
+    viewer.on_close()
+    assert counts[-1] == 0
+    assert session._refresh_timer is not None
+    assert session._refresh_timer.cancelled()
+
+
 async def test_state_is_requested_again_after_bus_reconnects(
     motion_store: MotionStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -3,9 +3,12 @@ from __future__ import annotations
 import asyncio
 from typing import Any
 
-from bunraku.websocket.connection import WebSocketConnection
+import pytest
+
+from bunraku.websocket.connection import FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import Opcode
-from bunraku.websocket.subprotocol import TRY_AGAIN_LATER, CloseConnection
+from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
+from tests.raw_client import client_frame
 
 
 class FakeTransport(asyncio.Transport):
@@ -15,8 +18,17 @@ class FakeTransport(asyncio.Transport):
         super().__init__()
         self.written = b""
         self.is_closed = False
+        self.is_reading = True
+        self.protocol: Any = None
 
-    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None: ...
+    def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
+        self.protocol = protocol
+
+    def pause_reading(self) -> None:
+        self.is_reading = False
+
+    def resume_reading(self) -> None:
+        self.is_reading = True
 
     def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None: ...
 
@@ -42,8 +54,9 @@ class RecordingListener:
     def on_message(self, message: bytes) -> None:
         self.events.append(f"message {message.decode()}")
 
-    def on_pong(self, payload: bytes) -> None:
+    def on_pong(self, payload: bytes) -> bool:
         self.events.append(f"pong {payload.decode()}")
+        return payload == b"payload"
 
     def on_pause(self) -> None:
         self.events.append("pause")
@@ -53,10 +66,6 @@ class RecordingListener:
 
     def on_close(self) -> None:
         self.events.append("close")
-
-
-def client_frame(opcode: Opcode, payload: bytes = b"") -> bytes:
-    return bytes((0x80 | opcode, 0x80 | len(payload))) + bytes(4) + payload
 
 
 async def test_received_data_updates_the_time_of_the_clock() -> None:
@@ -91,3 +100,87 @@ async def test_connection_that_is_closing_writes_and_delivers_nothing() -> None:
     connection.connection_lost(None)
     assert listener.events == ["pause", "close"]
     assert not connections
+
+
+FLOODS = {
+    "pings": [client_frame(Opcode.PING, b"x")],
+    "pongs": [client_frame(Opcode.PONG, b"x")],
+    "empty messages": [client_frame(Opcode.BINARY)],
+    "empty fragments": [client_frame(Opcode.BINARY, final=False), client_frame(Opcode.CONTINUATION, final=False)],
+    "segments of one byte": [b"\x82", b"\xfd"],
+}
+
+
+@pytest.mark.parametrize("name", FLOODS)
+async def test_flood_is_closed_with_the_reason_and_not_parsed_further(name: str) -> None:
+    transport, listener = FakeTransport(), RecordingListener()
+    limit = FrameLimit(10.0, 20.0)
+    connection = WebSocketConnection(transport, listener, set(), lambda: 0, limit)
+    first, *rest = FLOODS[name]
+    connection.data_received(first)
+    for _ in range(100):
+        if transport.protocol is not connection:
+            break
+        connection.data_received(rest[0] if rest else first)
+    assert connection.is_closing
+    assert POLICY_VIOLATION.to_bytes(2, "big") in transport.written
+    assert b"Too many messages" in transport.written
+    # from now on input is discarded, and read slowly
+    assert transport.protocol is not connection
+    assert not transport.is_reading
+    transport.protocol.data_received(first * 1_000)
+    assert len(listener.events) <= limit.burst + 1
+    transport.protocol.connection_lost(None)
+    assert listener.events[-1] == "close"
+
+
+async def test_flood_within_one_segment_gets_one_pong_at_most() -> None:
+    transport = FakeTransport()
+    connection = WebSocketConnection(transport, RecordingListener(), set(), lambda: 0, FrameLimit(0.0, 1_000.0))
+    connection.data_received(client_frame(Opcode.PING, b"1") * 400 + client_frame(Opcode.PING, b"2"))
+    assert transport.written == b"\x8a\x012"
+
+
+async def test_pongs_that_answer_do_not_count() -> None:
+    transport = FakeTransport()
+    connection = WebSocketConnection(transport, RecordingListener(), set(), lambda: 0, FrameLimit(0.0, 150.0))
+    for _ in range(100):
+        connection.data_received(client_frame(Opcode.PONG, b"payload"))
+    assert not connection.is_closing
+    for _ in range(100):
+        connection.data_received(client_frame(Opcode.PONG, b"guess"))
+    assert connection.is_closing
+
+
+async def test_limit_refills_with_the_clock() -> None:
+    now = 0
+    transport, listener = FakeTransport(), RecordingListener()
+    connection = WebSocketConnection(transport, listener, set(), lambda: now, FrameLimit(20.0, 10.0))
+    for _ in range(100):
+        # a message that arrives alone counts as a read and a frame
+        connection.data_received(client_frame(Opcode.BINARY, b"m"))
+        now += 100_000
+    assert not connection.is_closing
+    assert len(listener.events) == 100
+
+
+async def test_rest_of_a_segment_is_parsed_after_a_closing_message() -> None:
+    transport, listener = FakeTransport(), RecordingListener()
+    connection = WebSocketConnection(transport, listener, set())
+    connection.data_received(client_frame(Opcode.TEXT, b"hello") + client_frame(Opcode.CLOSE))
+    assert connection.is_closing
+    connection.data_received(b"")
+    # the Close frame in the same segment ends the connection at once
+    assert transport.is_closed
+
+
+@pytest.mark.parametrize(
+    ("payload", "code"),
+    [(b"", 1000), (b"\x03\xe9", 1001), (b"\x03\xe8\xff", 1007), (b"\x00\x01", 1002), (b"\x03", 1002)],
+)
+async def test_close_frame_is_answered_with_its_code(payload: bytes, code: int) -> None:
+    transport = FakeTransport()
+    connection = WebSocketConnection(transport, RecordingListener(), set())
+    connection.data_received(client_frame(Opcode.CLOSE, payload))
+    assert transport.written == b"\x88\x02" + code.to_bytes(2, "big")
+    assert transport.is_closed

@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from urllib.parse import urlsplit
 
 import pytest
 import uvicorn
@@ -13,10 +15,12 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from bunraku.websocket import handoff
 from bunraku.websocket.connection import WebSocketConnection
-from bunraku.websocket.frame import encode_frame
-from bunraku.websocket.handoff import HandoffProtocol, detach
+from bunraku.websocket.frame import Opcode, encode_frame
+from bunraku.websocket.handoff import HandoffProtocol, detach, reject
 from bunraku.websocket.subprotocol import CloseConnection
+from tests.raw_client import client_frame, open_raw, upgrade_request
 
 
 class RecordingListener:
@@ -35,7 +39,8 @@ class RecordingListener:
         self.messages.append(message)
         self.connection.write(encode_frame(b"echo " + message))
 
-    def on_pong(self, payload: bytes) -> None: ...
+    def on_pong(self, _: bytes) -> bool:
+        return False
 
     def on_pause(self) -> None:
         self.events.append("pause")
@@ -145,15 +150,43 @@ async def test_server_shutdown_closes_detached_connections() -> None:
         await listener.ended.wait()
 
 
-async def test_connection_that_is_not_detached_uses_asgi() -> None:
-    async def endpoint(ws: WebSocket) -> None:
-        await ws.accept()
-        await ws.send_bytes(await ws.receive_bytes())
-        await ws.close()
+async def test_rejected_client_gets_the_reason_however_much_it_sends() -> None:
+    ended = asyncio.Event()
 
-    async with serve_app(endpoint) as (url, _), connect(url, compression=None) as client:
-        await client.send(b"echo")
-        assert await client.recv() == b"echo"
+    async def endpoint(ws: WebSocket) -> None:
+        await reject(ws, CloseConnection(4401, "A link is needed", "ask for one"))
+        ended.set()
+
+    async with serve_app(endpoint) as (url, _):
+        reader, writer = await open_raw(url)
+        writer.write(client_frame(Opcode.PING) * 200_000)
+        received = await reader.read()
+        assert b"A link is needed" in received
+        # a Close frame with code 4401
+        assert b"\x88" in received
+        assert (4401).to_bytes(2, "big") in received
+        assert received.count(b"\x8a\x00") == 0
+        writer.close()
+        await ended.wait()
+
+
+async def test_handshake_that_is_not_answered_is_aborted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(handoff, "HANDSHAKE_TIMEOUT_S", 0.1)
+    ended = asyncio.Event()
+
+    async def endpoint(ws: WebSocket) -> None:
+        assert (await ws.receive())["type"] == "websocket.connect"
+        assert (await ws.receive())["type"] == "websocket.disconnect"
+        ended.set()
+
+    async with serve_app(endpoint) as (url, _):
+        parts = urlsplit(url)
+        reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
+        writer.write(upgrade_request(url))
+        with contextlib.suppress(ConnectionError):
+            assert await reader.read() == b""
+        writer.close()
+        await ended.wait()
 
 
 def test_detach_from_another_server_protocol_raises() -> None:

@@ -31,6 +31,7 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.websocket import subprotocol
+from bunraku.websocket.handoff import reject
 from bunraku.websocket.subprotocol import CloseConnection
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
@@ -197,7 +198,7 @@ class AuthorizationMiddleware:
         else:
             await self._app(scope, receive, send)
             return
-        await subprotocol.close_with_problem(WebSocket(scope, receive, send), reason)
+        await reject(WebSocket(scope, receive, send), reason)
 
     def _monotonic_seconds(self) -> float:
         return self._clock() / 1e6

@@ -1,8 +1,8 @@
 """Queue of received uploads that survives the failure of a replica.
 
 A received file stays in the motion store, with a job in the catalogue, until it is a motion. If a replica fails, its
-hold on the job expires and another replica runs the job: the client gets no response, but need not upload again. A
-client that disconnects while waiting cancels its job.
+hold on the job no longer changes and another replica runs the job: the client gets no response, but need not upload
+again. A client that disconnects while waiting cancels its job.
 """
 
 from __future__ import annotations
@@ -20,14 +20,17 @@ from typing import Any
 
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
+from bunraku.messaging.heartbeat_observer import HeartbeatObserver
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
-from bunraku.storage.record import Job
+from bunraku.storage.record import Job, JobHold
 
 POLL_INTERVAL_S = 2.0
 JOB_LEASE_US = 8_000_000
+MAX_OBSERVED_JOBS = 200
+"""Number of the oldest jobs that are considered for being resumed."""
 REQUEST_ID_KEY = "request_id"
 """Key in a job's details with the id of the HTTP request that uploaded it."""
 MAX_ATTEMPTS = 3
@@ -56,7 +59,7 @@ class JobQueueTiming:
     poll_s: float = POLL_INTERVAL_S
     """Interval between searches for abandoned jobs and renewals of own jobs, in seconds."""
     lease_us: int = JOB_LEASE_US
-    """Time for which each renewal holds a job, in microseconds."""
+    """Time without a renewal after which a job counts as abandoned, in microseconds."""
 
 
 DEFAULT_TIMING = JobQueueTiming()
@@ -79,6 +82,9 @@ class JobQueue:
         self._timing = timing
         self._replica_id = secrets.token_hex(8)
         self._held_jobs: set[str] = set()
+        # own jobs that nothing ran at the last search
+        self._left_jobs: set[str] = set()
+        self._hold_observer = HeartbeatObserver(timing.lease_us * 1e-6)
         self._resumed_tasks: set[asyncio.Task[None]] = set()
         self.resumed_jobs = 0
         """Number of abandoned jobs that this replica has resumed."""
@@ -128,8 +134,7 @@ class JobQueue:
                     if self._held_jobs:
                         held_until = self._context.clock() + self._timing.lease_us
                         await self._context.catalogue.renew_jobs(self._replica_id, held_until)
-                    if not self._worker_slots.locked():
-                        await self._claim_abandoned_job()
+                    await self._claim_abandoned_job()
                 except BackendUnavailable:
                     # logged by the requests that need the backend
                     continue
@@ -146,14 +151,43 @@ class JobQueue:
             await self._context.catalogue.renew_jobs(self._replica_id, 0)
 
     async def _claim_abandoned_job(self) -> None:
-        now = self._context.clock()
-        job = await self._context.catalogue.claim_job(self._replica_id, now, now + self._timing.lease_us)
+        """Claim the oldest abandoned job if a worker slot is free."""
+        catalogue = self._context.catalogue
+        holds = await catalogue.list_job_holds(MAX_OBSERVED_JOBS)
+        self._hold_observer.observe(holds, asyncio.get_running_loop().time())
+        still_left = {job_id for job_id in self._left_jobs if self._is_left(job_id, holds.get(job_id))}
+        self._left_jobs = {job_id for job_id, hold in holds.items() if self._is_left(job_id, hold)}
+        if self._worker_slots.locked():
+            return
+        abandoned = next(
+            (
+                job_id
+                for job_id, hold in holds.items()
+                if job_id in still_left or self._is_abandoned_by_another(job_id, hold)
+            ),
+            None,
+        )
+        if abandoned is None:
+            return
+        held_until = self._context.clock() + self._timing.lease_us
+        job = await catalogue.claim_job(abandoned, holds[abandoned], self._replica_id, held_until)
+        # an upload of the same file may have begun here meanwhile
         if job is None or job.id in self._held_jobs:
             return
         self._held_jobs.add(job.id)
         task = asyncio.create_task(self._resume_job(job), name=f"job {job.id}")
         self._resumed_tasks.add(task)
         task.add_done_callback(self._resumed_tasks.discard)
+
+    def _is_left(self, job_id: str, hold: JobHold | None) -> bool:
+        """Return whether an own job is not running: it is to be tried again, or is being discarded just now."""
+        return hold is not None and hold.holder == self._replica_id and job_id not in self._held_jobs
+
+    def _is_abandoned_by_another(self, job_id: str, hold: JobHold) -> bool:
+        """Return whether a job is released, or held by a replica that has stopped."""
+        if hold.holder == self._replica_id or job_id in self._held_jobs:
+            return False
+        return hold.until == 0 or self._hold_observer.has_stopped(job_id)
 
     async def _resume_job(self, job: Job) -> None:
         """Run an abandoned job under the id of the request that uploaded it."""

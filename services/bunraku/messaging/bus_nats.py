@@ -54,7 +54,7 @@ class NatsBus:
         Raise ValueError for another URL. `open` connects.
         """
         self._servers = parse_servers(url)
-        self._inbox = f"_INBOX.{secrets.token_hex(12)}"
+        self._inbox = self.new_inbox()
         self._subscription_ids = count(_INBOX_SUBSCRIPTION_ID + 1)
         self._subscriptions: dict[int, tuple[bytes, _DeliveryCallback]] = {}
         self._pending_requests: dict[str, asyncio.Future[bytes]] = {}
@@ -111,7 +111,22 @@ class NatsBus:
         self._connection.publish(subject, data)
 
     def subscribe(self, subject: str, handler: MessageHandler) -> Subscription:
-        return self._subscribe_raw(subject, "", lambda message: deliver(handler, subject, message.data))
+        return self._subscribe(subject, "", lambda message: deliver(handler, subject, message.data))
+
+    def subscribe_messages(self, subject: str, handler: Callable[[NatsMessage], None]) -> Subscription:
+        """Call `handler` with every message to `subject`, with its headers and the subject for a response."""
+
+        def deliver_message(message: NatsMessage) -> None:
+            try:
+                handler(message)
+            except Exception:
+                _log.exception("Handler of %s failed", subject)
+
+        return self._subscribe(subject, "", deliver_message)
+
+    def new_inbox(self) -> str:
+        """Return a subject that nothing else uses."""
+        return f"_INBOX.{secrets.token_hex(12)}"
 
     def serve(self, subject: str, responder: Responder) -> Subscription:
         async def respond(message: NatsMessage) -> None:
@@ -131,7 +146,7 @@ class NatsBus:
                 task.add_done_callback(self._response_tasks.discard)
 
         # a queue group: the server sends each request to one member
-        return self._subscribe_raw(subject, "answer", on_request)
+        return self._subscribe(subject, "answer", on_request)
 
     async def request(
         self,
@@ -194,7 +209,7 @@ class NatsBus:
         else:
             pending.set_result(message.data)
 
-    def _subscribe_raw(self, subject: str, group: str, on_delivery: _DeliveryCallback) -> Subscription:
+    def _subscribe(self, subject: str, group: str, on_delivery: _DeliveryCallback) -> Subscription:
         number = next(self._subscription_ids)
         command = f"SUB {validate_subject(subject)} {group} {number}\r\n".encode()
         self._subscriptions[number] = command, on_delivery

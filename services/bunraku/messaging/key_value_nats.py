@@ -8,20 +8,31 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import contextlib
 import json
+from collections import deque
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.bus_nats import NatsBus
-from bunraku.messaging.key_value import KeyValueEntry, RevisionConflict
+from bunraku.messaging.key_value import KeyValueEntry, KeyValueView, RevisionConflict
+from bunraku.messaging.key_value_watch_nats import OPERATION_HEADER, Bucket, NatsKeyValueWatch
 from bunraku.runtime.availability import BackendUnavailable
 
 BUCKET_NAME = "bunraku"
+MARKER_LIFETIME_S = 60.0
+"""Time after which the message that marks a key as removed is purged, in seconds: every watch has received it or has
+begun again."""
+MAX_MARKERS = 10_000
+"""Number of removed keys that a process remembers for the purge."""
+MAX_PURGES = 2
+"""Number of messages that are purged with each removal."""
+MAX_CREATE_ATTEMPTS = 3
+"""Number of attempts to create a key that was removed before."""
 _STREAM_NAME = f"KV_{BUCKET_NAME}"
 _API_PREFIX = "$JS.API.STREAM"
 _EXPECTED_SEQUENCE_HEADER = "Nats-Expected-Last-Subject-Sequence"
-_OPERATION_HEADER = "KV-Operation"
 _STREAM_CONFIG = {
     "name": _STREAM_NAME,
     "subjects": [f"$KV.{BUCKET_NAME}.>"],
@@ -58,6 +69,9 @@ class NatsKeyValueStore:
         self._bus = bus
         self._replicas = replicas
         self._stream_created = False
+        self._watch: NatsKeyValueWatch | None = None
+        # time of the purge, key and revision of messages that mark keys as removed
+        self._markers: deque[tuple[float, str, int]] = deque(maxlen=MAX_MARKERS)
 
     async def get(self, key: str) -> KeyValueEntry | None:
         last = await self._get_last_message(_subject(key))
@@ -65,10 +79,7 @@ class NatsKeyValueStore:
 
     async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
         query = {"subjects_filter": _subject(f"{prefix}.>")}
-        try:
-            info = await self._request(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(query).encode())
-        except _JetStreamError as error:
-            raise BackendUnavailable("the register", str(error)) from None
+        info = await self._request_or_unavailable(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(query).encode())
         subjects = list(info["state"].get("subjects") or ())
         messages = await asyncio.gather(*map(self._get_last_message, subjects))
         return {
@@ -78,20 +89,50 @@ class NatsKeyValueStore:
         }
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
-        try:
-            return await self._put(key, value, revision)
-        except RevisionConflict:
-            # a removed key has a message that marks the removal
-            last = await self._get_last_message(_subject(key)) if revision == 0 else None
-            if last is None or not last.is_removed:
-                raise
-            return await self._put(key, value, last.entry.revision)
+        expected = revision
+        for _ in range(MAX_CREATE_ATTEMPTS):
+            try:
+                return await self._put(key, value, expected)
+            except RevisionConflict:
+                if revision != 0:
+                    raise
+                # a removed key may have a message that marks the removal, until it is purged
+                last = await self._get_last_message(_subject(key))
+                if last is not None and not last.is_removed:
+                    raise
+                expected = 0 if last is None else last.entry.revision
+        raise RevisionConflict(key)
 
     async def remove(self, key: str, revision: int | None = None) -> None:
-        await self._put(key, b"", revision, {_OPERATION_HEADER: "DEL"})
+        marker = await self._put(key, b"", revision, {OPERATION_HEADER: "DEL"})
+        now_s = asyncio.get_running_loop().time()
+        self._markers.append((now_s + MARKER_LIFETIME_S, key, marker))
+        with contextlib.suppress(BackendUnavailable):
+            await self._purge_markers(now_s)
+
+    def watch(self) -> KeyValueView:
+        if self._watch is None:
+            self._watch = NatsKeyValueWatch(self._bus, Bucket(_STREAM_NAME, _subject(""), self._request_or_unavailable))
+        return self._watch.view
+
+    async def synchronise(self) -> None:
+        info = await self._request_or_unavailable(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", b"")
+        await self.watch().wait_for(int(info["state"]["last_seq"]))
 
     async def close(self) -> None:
-        """Do nothing: the owner of the bus closes it."""
+        """End the watch; the owner of the bus closes it."""
+        if self._watch is not None:
+            await self._watch.close()
+
+    async def _purge_markers(self, now_s: float) -> None:
+        """Purge the oldest messages of this store that mark keys as removed: the stream would grow for ever."""
+        for _ in range(MAX_PURGES):
+            if not self._markers or self._markers[0][0] > now_s:
+                return
+            _, key, marker = self._markers.popleft()
+            # up to the marker only: the key may exist again
+            query = json.dumps({"filter": _subject(key), "seq": marker + 1}).encode()
+            await self._request_or_unavailable(f"{_API_PREFIX}.PURGE.{_STREAM_NAME}", query)
 
     async def _put(self, key: str, value: bytes, revision: int | None, headers: Mapping[str, str] | None = None) -> int:
         expected = {} if revision is None else {_EXPECTED_SEQUENCE_HEADER: str(revision)}
@@ -111,8 +152,15 @@ class NatsKeyValueStore:
             if error.code != _NO_MESSAGE_ERROR:
                 raise BackendUnavailable("the register", str(error)) from None
             return None
-        removed = f"{_OPERATION_HEADER}:".encode() in base64.b64decode(message.get("hdrs", ""))
+        removed = f"{OPERATION_HEADER}:".encode() in base64.b64decode(message.get("hdrs", ""))
         return _LastMessage(KeyValueEntry(base64.b64decode(message.get("data", "")), int(message["seq"])), removed)
+
+    async def _request_or_unavailable(self, subject: str, data: bytes) -> dict[str, Any]:
+        """Return a response of JetStream; raise `BackendUnavailable` also for an error response."""
+        try:
+            return await self._request(subject, data)
+        except _JetStreamError as error:
+            raise BackendUnavailable("the register", str(error)) from None
 
     async def _request(self, subject: str, data: bytes, headers: Mapping[str, str] | None = None) -> dict[str, Any]:
         """Return a response of JetStream, creating the bucket if needed; raise `_JetStreamError`."""

@@ -57,6 +57,8 @@ class Settings(BaseSettings):
     """Maximum number of motions of one subject; 0: unlimited. Effective with a secret."""
     quota_bytes: int = 1 << 30
     """Maximum bytes of motions of one subject; 0: unlimited. Effective with a secret."""
+    quota_sessions: int = 50
+    """Maximum number of open sessions of one subject at all replicas; 0: unlimited. Effective with a secret."""
     total_motions: int = 0
     """Maximum number of motions of all subjects; 0: unlimited."""
     total_bytes: int = 0
@@ -101,6 +103,10 @@ class Settings(BaseSettings):
         """Return the limits on stored motions; those per subject apply only with a secret, as subjects need tokens."""
         per_subject = (self.quota_motions, self.quota_bytes) if self.secret.get_secret_value() else (0, 0)
         return Quota(*per_subject, self.total_motions, self.total_bytes)
+
+    def session_quota(self) -> int:
+        """Return the limit on open sessions of one subject, 0 without a secret, as subjects need tokens."""
+        return self.quota_sessions if self.secret.get_secret_value() else 0
 
     def catalogue_url(self) -> str:
         """Return the URL of the catalogue, or its default."""

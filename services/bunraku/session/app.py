@@ -46,9 +46,10 @@ def create_app(context: ServiceContext) -> FastAPI:
 
     @app.post("/v1/sessions", status_code=201, tags=["sessions"])
     @requires(Role.CONTROL)
-    async def open_session(new: NewSession) -> JSONResponse:
+    async def open_session(new: NewSession, request: Request) -> JSONResponse:
         """Play a motion on a shared timeline."""
-        session = await sessions.open_session(new.motion, playing=new.playing, loop=new.loop)
+        subject = access_of(request).subject
+        session = await sessions.open_session(new.motion, playing=new.playing, loop=new.loop, subject=subject)
         return JSONResponse(session, 201, {"Location": f"/v1/sessions/{session['id']}"})
 
     @app.get("/v1/sessions", tags=["sessions"])
@@ -98,9 +99,9 @@ def create_app(context: ServiceContext) -> FastAPI:
     @requires(Role.CONTROL)
     async def control(socket: WebSocket, session: str, name: str = "Someone") -> None:
         with contextlib.suppress(WebSocketDisconnect):
-            await control_endpoint.serve_puppeteer(
-                socket, sessions.stage_proxy(session), context, name, sessions.counters
-            )
+            subject = access_of(socket).subject if context.authenticator.requires_token else None
+            stage = sessions.stage_proxy(session, subject)
+            await control_endpoint.serve_puppeteer(socket, stage, context, name, sessions.counters)
 
     async def bound_session(access: Access) -> list[dict[str, Any]]:
         try:

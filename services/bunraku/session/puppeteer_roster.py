@@ -11,12 +11,14 @@ from bunraku.wire.messages import Refusal
 COLOUR_COUNT = 5
 MAX_PUPPETEERS = 32
 """Most puppeteers of one session."""
+MAX_PUPPETEERS_PER_SUBJECT = 16
+"""Most puppeteers of one session that use tokens of the same subject; no limit without tokens."""
 LOST_NOTICE_INTERVAL_US = 1_000_000
 """Interval between two refusals sent to a puppeteer who still acts on a lost limb."""
 
 
 class SessionFull(Exception):
-    """Session with `MAX_PUPPETEERS` puppeteers."""
+    """Session with `MAX_PUPPETEERS` puppeteers, or `MAX_PUPPETEERS_PER_SUBJECT` of one subject."""
 
 
 @dataclass(eq=False, slots=True)
@@ -24,6 +26,7 @@ class Puppeteer:
     """Puppeteer of a stage.
 
     `send` queues one message and returns at once. `last_heard_us` is the clock time of the last message or heartbeat.
+    `subject` is that of the token, None without access control.
     `granted_limbs` are the limbs that the puppeteer was granted and has not released.
     """
 
@@ -32,6 +35,7 @@ class Puppeteer:
     colour: int
     send: Callable[[bytes], None]
     last_heard_us: int
+    subject: str | None = None
     granted_limbs: set[int] = field(default_factory=set)
     _notice_throttle: NoticeThrottle = field(default_factory=NoticeThrottle)
     _lost_notice_us: dict[int, int] = field(default_factory=dict)
@@ -68,13 +72,17 @@ class PuppeteerRoster:
         """Return the puppeteer of this id, or None."""
         return self._by_id.get(puppeteer_id)
 
-    def join(self, puppeteer_id: str, name: str, send: Callable[[bytes], None], now: int) -> Puppeteer:
+    def join(
+        self, puppeteer_id: str, name: str, send: Callable[[bytes], None], now: int, subject: str | None = None
+    ) -> Puppeteer:
         """Add a puppeteer with the first free colour; raises `SessionFull`."""
         if len(self._by_id) >= MAX_PUPPETEERS:
             raise SessionFull(f"{MAX_PUPPETEERS} puppeteers are here already")
+        if subject is not None and sum(p.subject == subject for p in self) >= MAX_PUPPETEERS_PER_SUBJECT:
+            raise SessionFull(f"{MAX_PUPPETEERS_PER_SUBJECT} puppeteers with this link are here already")
         used = [p.colour for p in self]
         colour = min(range(COLOUR_COUNT), key=lambda c: (used.count(c), c))
-        puppeteer = self._by_id[puppeteer_id] = Puppeteer(puppeteer_id, name, colour, send, now)
+        puppeteer = self._by_id[puppeteer_id] = Puppeteer(puppeteer_id, name, colour, send, now, subject)
         return puppeteer
 
     def leave(self, puppeteer: Puppeteer) -> None:

@@ -1,9 +1,8 @@
 """Sessions of one replica: opened here, or taken over from a replica that has stopped.
 
-A session is owned by one replica. The key-value store names the owner, beside the state that another replica needs to
-continue the session, and holds a heartbeat counter of every replica. A replica whose counter stands still for
-`REPLICA_TIMEOUT_S` is gone, and the first other replica that writes its own name into the record owns the session. A
-replica that could not reach the store itself waits for another such period before it declares any other replica gone.
+A stage exists only for a record that this replica has just written (`bunraku.session.session_registry`), and is closed
+as soon as the record shows that the session has ended or belongs to another replica. Sessions without a living owner,
+and those that were claimed here without getting a stage, are claimed again.
 """
 
 from __future__ import annotations
@@ -12,99 +11,79 @@ import asyncio
 import contextlib
 import logging
 import secrets
-from typing import Any, NamedTuple
-
-import msgpack
+from typing import Any
 
 from bunraku.codec.container import StoredMotion
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
-from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, RevisionConflict
+from bunraku.messaging.replica_registry import DEFAULT_TIMING, NO_REPLICA, ReplicaTiming
 from bunraku.playout import timeline
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.session.counters import SessionCounters
+from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRecord, SessionRegistry
 from bunraku.session.stage import SessionStart, Stage, load_bend_tables
 from bunraku.session.stage_endpoint import StageEndpoint, session_json
 from bunraku.session.stage_proxy import StageProxy
-from bunraku.wire.messages import TimelineState, unpack
 
 MAX_SESSIONS = 1_000
 """Sessions of one replica."""
 IDLE_TIMEOUT_US = 24 * 3_600 * 1_000_000
 """A session without viewers and puppeteers for this long is ended."""
-HEARTBEAT_INTERVAL_S = 1.0
-REPLICA_TIMEOUT_S = 2.5
-"""Time without a heartbeat after which a replica's sessions are taken over."""
-REPLICA_REMOVAL_S = 60.0
-"""Time without a heartbeat after which a replica's counter is removed."""
-REPLICA_PREFIX = "replicas"
-NO_OWNER = ""
+IDLE_GRACE_US = 10_000_000
+"""A session without viewers and puppeteers for this long may be ended to make room at a full replica."""
+MAX_CONCURRENT_CLAIMS = 8
+"""Number of sessions that a replica takes over at the same time."""
 
 _log = logging.getLogger(__name__)
-
-
-class SessionRecord(NamedTuple):
-    """Record of a session in the key-value store."""
-
-    owner: str
-    created_us: int
-    """Clock time of the creation."""
-    timeline: bytes
-
-    def pack(self) -> bytes:
-        """Return the fields as MessagePack."""
-        packed: bytes = msgpack.packb(tuple(self))
-        return packed
 
 
 class SessionManager:
     """Stages of this replica, and proxies of the stages of all replicas."""
 
-    def __init__(self, context: ServiceContext) -> None:
+    def __init__(self, context: ServiceContext, timing: ReplicaTiming = DEFAULT_TIMING) -> None:
         self._context = context
-        self._replica = secrets.token_hex(6)
+        self._registry = SessionRegistry(context.key_values, timing)
         self._endpoints: dict[str, StageEndpoint] = {}
-        self._opening_sessions: set[str] = set()
-        self._heartbeat_count = 0
+        # sessions that this replica creates or claims now, with the subject for which one is created
+        self._pending: dict[str, str | None] = {}
+        self._claim_slots = asyncio.Semaphore(MAX_CONCURRENT_CLAIMS)
+        self._claim_tasks: set[asyncio.Task[None]] = set()
+        self._changed_sessions: set[str] = set()
+        self._has_changes = asyncio.Event()
+        self._registry.replicas.on_heartbeat(self._review_all)
         self.counters = SessionCounters()
         self._solver = PYTHON_SOLVER
-        self._last_heartbeat_us = context.clock()
-        # by replica: the newest revision of its counter, and the time when that was first seen
-        self._replica_heartbeats: dict[str, tuple[int, int]] = {}
 
-    def stage_proxy(self, session: str) -> StageProxy:
-        """Return the proxy of a session on any replica."""
-        return StageProxy(session, self._context.bus, self._context.key_values)
+    def stage_proxy(self, session: str, subject: str | None = None) -> StageProxy:
+        """Return the proxy of a session on any replica, for a client of `subject` (None: without limits)."""
+        return StageProxy(session, self._context.bus, self._context.key_values, subject)
 
     async def open_session(
-        self, motion: str, *, playing: bool = True, loop: bool = True, session: str | None = None
+        self, motion: str, *, playing: bool = True, loop: bool = True, session: str | None = None, subject: str = ""
     ) -> dict[str, Any]:
-        """Open a session and return it as the API shows it; raises `ProblemError`.
+        """Open a session of `subject` and return it as the API shows it; raises `ProblemError`.
 
-        With a given id, `session`, raises `RevisionConflict` if any replica has a session with that id.
+        With a given id, `session`, raises `RevisionConflict` of the store if any replica has a session with that id.
         """
         stored = await self.load_motion(motion)
-        if len(self._endpoints) >= MAX_SESSIONS:
-            raise ProblemError(
-                503,
-                "Too many sessions",
-                f"this server has {MAX_SESSIONS} open sessions",
-                hint="end a session, or try again later",
-            )
         await asyncio.to_thread(load_bend_tables, stored)
+        self._registry.watch(self._review)
+        replica = await self._registry.replicas.register()
+        self._require_quota(subject, 1)
+        await self._make_room(subject)
         now, session = self._context.clock(), session or secrets.token_hex(9)
         state = timeline.start(motion, stored.first_track.duration_us, now, playing=playing, loop=loop)
-        self._opening_sessions.add(session)
+        self._pending[session] = subject
         try:
-            record = SessionRecord(self._replica, now, state.pack())
-            revision = await self._context.key_values.put(_session_key(session), record.pack(), 0)
-            stage = self._add_stage(SessionStart(session, stored, state, now), revision)
-            self.counters.sessions["opened",] += 1
-            _log.info("session %s plays motion %s", session, motion)
+            revision = await self._registry.create(session, SessionRecord(replica, now, state.pack(), subject))
+            stage = self._add_stage(SessionStart(session, stored, state, now, subject), revision)
         finally:
-            self._opening_sessions.discard(session)
+            self._pending.pop(session, None)
+        await self._confirm_quota(session, subject, revision)
+        self.counters.sessions["opened",] += 1
+        _log.info("session %s plays motion %s", session, motion)
         return session_json(stage, now)
 
     @property
@@ -118,21 +97,14 @@ class SessionManager:
         for stage in self.stages:
             stage.use_solver(solver)
 
-    def _add_stage(self, start: SessionStart, revision: int) -> Stage:
-        # the stage outlives the request that opens it
-        with request_id.bind(""):
-            stage = Stage(start, self._context.bus, self._context.clock, self.counters, self._solver)
-            self._endpoints[start.id] = StageEndpoint(stage, self._context, self, revision)
-        return stage
-
     async def list_sessions(self, limit: int, cursor: str | None) -> tuple[list[dict[str, Any]], str | None]:
         """Return at most `limit` sessions of all replicas, oldest first, and the cursor of the next page.
 
         Raises `ProblemError`.
         """
-        registered = await self._context.key_values.list_prefix(SESSION_KEY_PREFIX)
-        records = {key: SessionRecord(*msgpack.unpackb(one.value)) for key, one in registered.items()}
-        ids = [key.partition(".")[2] for key in sorted(records, key=lambda key: (records[key].created_us, key))]
+        self._registry.watch(self._review)
+        await self._registry.synchronise()
+        ids = self._registry.list_by_age()
         if cursor is not None and cursor not in ids:
             raise ProblemError(
                 422, "Bad cursor", "the session at the cursor has ended; list from the first page", field="cursor"
@@ -151,108 +123,211 @@ class SessionManager:
         return stored
 
     async def save_record(self, stage: Stage) -> None:
-        """Save the state of a stage; raises `ProblemError` if another replica owns the session now."""
-        record = SessionRecord(self._replica, stage.created, stage.timeline.pack())
-        try:
-            endpoint = self._endpoints[stage.id]
-            endpoint.revision = await self._context.key_values.put(
-                _session_key(stage.id), record.pack(), endpoint.revision
-            )
-        except (RevisionConflict, KeyError):
-            raise ProblemError(
-                503, "Session elsewhere", "another server has taken over this session", hint="try again"
-            ) from None
+        """Save the state of a stage; raises `ProblemError` if the session has ended or another replica owns it now."""
+        endpoint = self._require_endpoint(stage.id)
+        async with endpoint.record_lock:
+            self._require_endpoint(stage.id)
+            try:
+                endpoint.revision = await self._registry.save(
+                    stage.id, _record_of(stage, self._registry.replicas.id), endpoint.revision
+                )
+            except SessionLost as lost:
+                await self._close_stage(stage.id)
+                raise _lost_problem(lost) from None
 
     async def end_session(self, session: str) -> None:
-        """End a session of this replica."""
-        await self._close_stage(session)
-        await self._context.key_values.remove(_session_key(session))
+        """End a session of this replica. Raises `ProblemError` if another replica owns it now.
+
+        The session has ended once its record is removed, before the stage is closed.
+        """
+        endpoint = self._require_endpoint(session)
+        async with endpoint.record_lock:
+            if session not in self._endpoints:
+                # a request at the same time has ended it
+                return
+            try:
+                await self._registry.remove(session, endpoint.revision)
+            except SessionLost as lost:
+                await self._close_stage(session)
+                if not lost.has_ended:
+                    raise _lost_problem(lost) from None
+            await self._close_stage(session)
 
     async def run(self) -> None:
         """Send heartbeats, take over abandoned sessions and end idle ones, until cancelled."""
-        while True:
-            try:
-                await self._send_heartbeat()
-                await self._end_idle_sessions()
-            except BackendUnavailable as error:
-                _log.warning("%s; trying again", error)
-            except Exception:
-                _log.exception("maintenance of the sessions failed; trying again")
-            await asyncio.sleep(HEARTBEAT_INTERVAL_S)
+        self._registry.watch(self._review)
+        heartbeats = asyncio.create_task(self._registry.replicas.run(), name="heartbeats of this replica")
+        try:
+            while True:
+                await self._has_changes.wait()
+                self._has_changes.clear()
+                try:
+                    await self._settle_changes()
+                except BackendUnavailable as error:
+                    _log.warning("%s; trying again", error)
+                except Exception:
+                    _log.exception("maintenance of the sessions failed; trying again")
+        finally:
+            for task in (heartbeats, *self._claim_tasks):
+                task.cancel()
+            await asyncio.gather(heartbeats, *self._claim_tasks, return_exceptions=True)
 
     async def close(self) -> None:
         """Hand all sessions to the other replicas, which take over by timeout if the store is unavailable."""
-        key_values = self._context.key_values
         for session, endpoint in tuple(self._endpoints.items()):
-            record = SessionRecord(NO_OWNER, endpoint.stage.created, endpoint.stage.timeline.pack())
-            await self._close_stage(session)
-            with contextlib.suppress(RevisionConflict, BackendUnavailable):
-                await key_values.put(_session_key(session), record.pack(), endpoint.revision)
-                self.counters.sessions["handed on",] += 1
-        with contextlib.suppress(BackendUnavailable):
-            await key_values.remove(f"{REPLICA_PREFIX}.{self._replica}")
+            async with endpoint.record_lock:
+                if session not in self._endpoints:
+                    continue
+                # first, so that no other replica has the stage as well
+                await self._close_stage(session)
+                with contextlib.suppress(SessionLost, BackendUnavailable):
+                    await self._registry.save(session, _record_of(endpoint.stage, NO_REPLICA), endpoint.revision)
+                    self.counters.sessions["handed on",] += 1
+        self._registry.close()
+        await self._registry.replicas.close()
 
-    async def _send_heartbeat(self) -> None:
-        key_values = self._context.key_values
-        self._heartbeat_count += 1
-        await key_values.put(f"{REPLICA_PREFIX}.{self._replica}", str(self._heartbeat_count).encode())
-        counts, sessions, now = (
-            await key_values.list_prefix(REPLICA_PREFIX),
-            await key_values.list_prefix(SESSION_KEY_PREFIX),
-            self._context.clock(),
-        )
-        was_delayed = now - self._last_heartbeat_us > 2e6 * HEARTBEAT_INTERVAL_S
-        self._last_heartbeat_us = now
-        for replica, count in counts.items():
-            revision, since = self._replica_heartbeats.get(replica, (0, now))
-            self._replica_heartbeats[replica] = (
-                count.revision,
-                now if was_delayed or revision != count.revision else since,
+    # limits
+
+    def _require_quota(self, subject: str, additional: int) -> None:
+        """Raise `ProblemError` if the subject has too many sessions at all replicas, `additional` ones included."""
+        limit = self._context.settings.session_quota()
+        registered = self._registry.sessions
+        opening = sum(owner == subject and session not in registered for session, owner in self._pending.items())
+        if limit and self._registry.count_sessions(subject) + opening + additional > limit:
+            raise ProblemError(
+                403,
+                "Quota used up",
+                f"{subject or 'this client'} has {limit} open sessions, the most that one subject may have",
+                hint="end a session",
             )
-            if now - self._replica_heartbeats[replica][1] > 1e6 * REPLICA_REMOVAL_S:
-                await key_values.remove(replica)
-        self._replica_heartbeats = {
-            replica: seen for replica, seen in self._replica_heartbeats.items() if replica in counts
-        }
-        for key, registered in sessions.items():
-            session, record = key.partition(".")[2], SessionRecord(*msgpack.unpackb(registered.value))
-            is_own = record.owner == self._replica
-            if session in self._endpoints:
-                if not is_own:
-                    await self._close_stage(session)
-            elif session not in self._opening_sessions and (is_own or self._has_expired(record.owner, now)):
-                await self._take_over(session, record, registered)
 
-    def _has_expired(self, owner: str, now: int) -> bool:
-        seen = self._replica_heartbeats.get(f"{REPLICA_PREFIX}.{owner}")
-        return seen is None or now - seen[1] > 1e6 * REPLICA_TIMEOUT_S
-
-    async def _take_over(self, session: str, record: SessionRecord, entry: KeyValueEntry) -> None:
-        state = unpack(record.timeline)
-        assert isinstance(state, TimelineState)
-        own_record = SessionRecord(self._replica, record.created_us, record.timeline)
-        try:
-            revision = await self._context.key_values.put(_session_key(session), own_record.pack(), entry.revision)
-        except RevisionConflict:
+    async def _confirm_quota(self, session: str, subject: str, revision: int) -> None:
+        """End a new session if others that were opened at the same time, here or elsewhere, have used up the quota."""
+        if not self._context.settings.session_quota():
             return
+        try:
+            await self._registry.wait_for(revision)
+            self._require_quota(subject, 0)
+        except (ProblemError, BackendUnavailable):
+            await self.end_session(session)
+            raise
+
+    async def _make_room(self, subject: str) -> None:
+        """End idle sessions of the subjects with the most sessions while this replica is full.
+
+        Raises `ProblemError` if no subject with at least as many sessions as `subject` has an idle one.
+        """
+        while len(self._endpoints) + len(self._pending) >= MAX_SESSIONS:
+            now, count = self._context.clock(), self._registry.count_sessions
+            idle = [
+                endpoint.stage for endpoint in self._endpoints.values() if endpoint.stage.is_idle(now, IDLE_GRACE_US)
+            ]
+            victim = max(idle, key=lambda stage: (count(stage.subject), -stage.last_active_us), default=None)
+            if victim is None or count(victim.subject) < count(subject):
+                raise ProblemError(
+                    503,
+                    "Too many sessions",
+                    f"this server has {MAX_SESSIONS} open sessions",
+                    hint="end a session, or try again later",
+                )
+            _log.warning("session %s ended: it was idle, and this server is full", victim.id)
+            await self.end_session(victim.id)
+
+    # changes
+
+    def _review(self, session: str) -> None:
+        """Settle a session whose record has changed."""
+        self._changed_sessions.add(session)
+        self._has_changes.set()
+
+    def _review_all(self) -> None:
+        """Settle all sessions: the liveness of their owners may have changed."""
+        self._changed_sessions |= self._registry.sessions.keys() | self._endpoints.keys()
+        self._has_changes.set()
+
+    async def _settle_changes(self) -> None:
+        """Close lost stages, claim abandoned sessions and end idle ones."""
+        changed, self._changed_sessions = self._changed_sessions, set()
+        for session in changed:
+            endpoint = self._endpoints.get(session)
+            if endpoint is not None and self._registry.is_lost(session, endpoint.revision):
+                _log.warning("session %s has ended or belongs to another server now", session)
+                await self._close_stage(session)
+        for session in changed:
+            if self._is_abandoned(session):
+                self._start_claim(session)
+        now = self._context.clock()
+        for session, endpoint in tuple(self._endpoints.items()):
+            if endpoint.stage.is_idle(now, IDLE_TIMEOUT_US):
+                with contextlib.suppress(ProblemError):
+                    await self.end_session(session)
+
+    def _is_abandoned(self, session: str) -> bool:
+        """Return whether a session has no living owner, or belongs to this replica without having a stage."""
+        registered = self._registry.sessions.get(session)
+        if registered is None or session in self._endpoints or session in self._pending:
+            return False
+        replicas = self._registry.replicas
+        return registered.record.owner == replicas.id or not replicas.is_alive(registered.record.owner)
+
+    def _start_claim(self, session: str) -> None:
+        self._pending[session] = None
+        task = asyncio.create_task(self._claim(session), name=f"claim session {session}")
+        self._claim_tasks.add(task)
+        task.add_done_callback(self._claim_tasks.discard)
+
+    async def _claim(self, session: str) -> None:
+        try:
+            async with self._claim_slots:
+                # others may have claimed it meanwhile
+                registered = self._registry.sessions.get(session)
+                if registered is not None:
+                    await self._take_over(session, registered)
+        except BackendUnavailable as error:
+            _log.warning("session %s not taken over: %s; trying again", session, error)
+        except Exception:
+            _log.exception("session %s not taken over; trying again", session)
+        finally:
+            self._pending.pop(session, None)
+
+    async def _take_over(self, session: str, registered: RegisteredSession) -> None:
+        claimed = await self._registry.claim(session, registered)
+        if claimed is None:
+            return
+        state = claimed.record.parse_timeline()
         stored = await self._context.motion_store.get(state.motion)
         if stored is None:
             _log.warning("session %s ended: its motion %s no longer exists", session, state.motion)
-            await self._context.key_values.remove(_session_key(session))
+            with contextlib.suppress(SessionLost):
+                await self._registry.remove(session, claimed.revision)
             return
         await asyncio.to_thread(load_bend_tables, stored)
-        stage = self._add_stage(SessionStart(session, stored, state, record.created_us), revision)
-        stage.announce_takeover()
+        # written again, as loading may have taken long: the stage belongs to the last write
+        confirmed = await self._registry.claim(session, claimed)
+        if confirmed is None:
+            return
+        start = SessionStart(session, stored, state, claimed.record.created_us, claimed.record.subject)
+        self._add_stage(start, confirmed.revision).announce_takeover()
         self.counters.sessions["taken over",] += 1
         _log.warning("session %s taken over from another server", session)
 
-    async def _end_idle_sessions(self) -> None:
-        for session, endpoint in tuple(self._endpoints.items()):
-            if (
-                endpoint.stage.participant_count == 0
-                and self._context.clock() - endpoint.stage.last_active_us > IDLE_TIMEOUT_US
-            ):
-                await self.end_session(session)
+    # stages
+
+    def _add_stage(self, start: SessionStart, revision: int) -> Stage:
+        # the stage outlives the request that opens it
+        with request_id.bind(""):
+            stage = Stage(start, self._context.bus, self._context.clock, self.counters, self._solver)
+            self._endpoints[start.id] = StageEndpoint(stage, self._context, self, revision)
+        # the record may have changed before the answer to its write arrived
+        self._review(start.id)
+        return stage
+
+    def _require_endpoint(self, session: str) -> StageEndpoint:
+        """Return the endpoint of a session of this replica. Raises `ProblemError`."""
+        endpoint = self._endpoints.get(session)
+        if endpoint is None:
+            raise _lost_problem(SessionLost(session, has_ended=False))
+        return endpoint
 
     async def _close_stage(self, session: str) -> None:
         endpoint = self._endpoints.pop(session, None)
@@ -260,5 +335,11 @@ class SessionManager:
             await endpoint.close()
 
 
-def _session_key(session: str) -> str:
-    return f"{SESSION_KEY_PREFIX}.{session}"
+def _record_of(stage: Stage, owner: str) -> SessionRecord:
+    return SessionRecord(owner, stage.created, stage.timeline.pack(), stage.subject)
+
+
+def _lost_problem(lost: SessionLost) -> ProblemError:
+    if lost.has_ended:
+        return ProblemError(404, "No such session", "the session has ended")
+    return ProblemError(503, "Session elsewhere", "another server has taken over this session", hint="try again")

@@ -25,6 +25,7 @@ from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_joints
+from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
@@ -43,6 +44,9 @@ FRAMES_PER_MESSAGE = 2
 """Frames of one message: packets, not bytes, fill a constrained link."""
 MAX_CATCH_UP_FRAMES = 6
 """Frames published late after a stall; earlier ones are skipped."""
+PRESENCES_PER_S, PRESENCE_BURST = 20.0, 40
+"""Rate of Presence messages, each of which goes to every viewer, and their number at once: a puppeteer may cause a
+change with every message."""
 VIEWER_COUNT_INTERVAL_S = 0.5
 """Interval between two publications of the viewer count."""
 
@@ -57,6 +61,16 @@ class SessionStart:
     """Timeline of the motion."""
     created_us: int
     """Clock time of the creation."""
+    subject: str = ""
+    """Subject of the token that opened the session."""
+
+
+@dataclass(slots=True)
+class ReportedViewers:
+    """Number of viewers at one stream replica, and the clock time of its report."""
+
+    count: int
+    last_heard_us: int
 
 
 class Stage:
@@ -77,14 +91,17 @@ class Stage:
         """
         self.id = start.id
         self.created = start.created_us
+        self.subject = start.subject
         self._bus = bus
         self._clock = clock
         self._counters = counters or SessionCounters()
         self._timelines = timeline.TimelineHistory()
         self._timelines.put(start.timeline)
         self.puppeteers = PuppeteerRoster()
-        self._viewers_by_replica: dict[str, int] = {}
+        self._reported_viewers: dict[str, ReportedViewers] = {}
         self._viewer_count_timer: asyncio.TimerHandle | None = None
+        self._presence_rate = TokenBucket(PRESENCES_PER_S, PRESENCE_BURST)
+        self._presence_timer: asyncio.TimerHandle | None = None
         self._has_grants = asyncio.Event()
         self._stall_compensation = EventLoopStallCompensation()
         self._sequence = 0
@@ -105,8 +122,9 @@ class Stage:
 
     async def close(self) -> None:
         """Stop the stage; its puppeteers receive nothing more."""
-        if self._viewer_count_timer is not None:
-            self._viewer_count_timer.cancel()
+        for timer in (self._viewer_count_timer, self._presence_timer):
+            if timer is not None:
+                timer.cancel()
         self._tick_task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._tick_task
@@ -137,7 +155,33 @@ class Stage:
     @property
     def participant_count(self) -> int:
         """Number of viewers and puppeteers."""
-        return sum(self._viewers_by_replica.values()) + len(self.puppeteers)
+        return self.viewer_count + len(self.puppeteers)
+
+    @property
+    def viewer_count(self) -> int:
+        """Number of viewers at all stream replicas that have reported lately."""
+        return sum(reported.count for reported in self._reported_viewers.values())
+
+    def is_idle(self, now: int, duration_us: int) -> bool:
+        """Return whether the session has had neither viewers nor puppeteers for `duration_us`."""
+        return self.participant_count == 0 and now - self.last_active_us >= duration_us
+
+    def expire_viewer_counts(self, timeout_us: int, stalled_us: int = 0) -> None:
+        """Forget the viewers of stream replicas that have not reported for `timeout_us`.
+
+        During the last `stalled_us` the event loop was blocked, and no report could be received.
+        """
+        oldest_us = self._clock() - timeout_us
+        for reported in self._reported_viewers.values():
+            reported.last_heard_us += stalled_us
+        kept = {
+            replica: reported
+            for replica, reported in self._reported_viewers.items()
+            if reported.last_heard_us >= oldest_us
+        }
+        if len(kept) != len(self._reported_viewers):
+            self._reported_viewers = kept
+            self._schedule_presence()
 
     @property
     def holders(self) -> tuple[str | None, ...]:
@@ -149,7 +193,7 @@ class Stage:
         """Viewer count, puppeteers, limb holders and requests for limbs."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         asks = [list(limb) for limb in self._ownership.asks()]
-        return Presence(sum(self._viewers_by_replica.values()), puppeteers, list(self.holders), asks)
+        return Presence(self.viewer_count, puppeteers, list(self.holders), asks)
 
     def edit_timeline(self, *, playing: bool | None, position: int | None, loop: bool | None) -> TimelineState:
         """Edit the timeline for everyone, `EDIT_LEAD_US` from now."""
@@ -174,9 +218,14 @@ class Stage:
             self._publish_presence()
         return state
 
-    def join(self, puppeteer_id: str, name: str, send: Callable[[bytes], None]) -> Puppeteer:
-        """Add a puppeteer, whose messages are passed to `send`; raises `SessionFull`."""
-        puppeteer = self.puppeteers.join(puppeteer_id, name, send, self._clock())
+    def join(
+        self, puppeteer_id: str, name: str, send: Callable[[bytes], None], subject: str | None = None
+    ) -> Puppeteer:
+        """Add a puppeteer, whose messages are passed to `send`; raises `SessionFull`.
+
+        `subject` is that of the puppeteer's token, None without access control.
+        """
+        puppeteer = self.puppeteers.join(puppeteer_id, name, send, self._clock(), subject)
         puppeteer.send(Welcome(puppeteer.id, puppeteer.colour, OVERLAY_LEAD_US).pack())
         self._publish_presence()
         return puppeteer
@@ -211,10 +260,20 @@ class Stage:
                 if limb >= len(holders) or holders[limb] != puppeteer.id:
                     puppeteer.send_limb_lost(limb, now)
         elif isinstance(message, Ask):
+            if message.wanted and self._asks_under_another_name(puppeteer, message.limb):
+                return
             if self._ownership.ask(message.limb, puppeteer.id, message.wanted, now):
                 self._publish_presence()
         elif isinstance(message, Input):
             self._receive_input(puppeteer, message, now)
+
+    def _asks_under_another_name(self, puppeteer: Puppeteer, limb: int) -> bool:
+        """Return whether another puppeteer of the same subject asks for a limb: each subject has one place."""
+        asks = self._ownership.asks()
+        others = map(self.puppeteers.get, asks[limb] if 0 <= limb < len(asks) else ())
+        return puppeteer.subject is not None and any(
+            other is not None and other is not puppeteer and other.subject == puppeteer.subject for other in others
+        )
 
     def _receive_input(self, puppeteer: Puppeteer, message: Input, now: int) -> None:
         limb_input = LimbInput(
@@ -251,7 +310,20 @@ class Stage:
         return state
 
     def _publish_presence(self) -> None:
+        """Publish the presence, or together with later changes if there were many just now."""
         self.last_active_us = self._clock()
+        if self._presence_rate.take(self.last_active_us * 1e-6):
+            self._send_presence()
+        elif self._presence_timer is None:
+            self._presence_timer = asyncio.get_running_loop().call_later(
+                1 / PRESENCES_PER_S, self._publish_late_presence
+            )
+
+    def _publish_late_presence(self) -> None:
+        self._presence_timer = None
+        self._publish_presence()
+
+    def _send_presence(self) -> None:
         packed = self.presence.pack()
         self._bus.publish(f"session.{self.id}.presence", packed)
         for puppeteer in self.puppeteers:
@@ -263,10 +335,11 @@ class Stage:
 
     def _receive_viewer_count(self, message: bytes) -> None:
         replica, count = msgpack.unpackb(message)
-        self._viewers_by_replica[replica] = count
-        if count == 0:
-            del self._viewers_by_replica[replica]
-        self._schedule_presence()
+        before = self._reported_viewers.pop(replica, None)
+        if count:
+            self._reported_viewers[replica] = ReportedViewers(count, self._clock())
+        if count != (before.count if before else 0):
+            self._schedule_presence()
 
     def _schedule_presence(self) -> None:
         """Publish the viewer count now, or after the interval if it was published just now.
@@ -275,14 +348,13 @@ class Stage:
         """
         if self._viewer_count_timer is None:
             self._publish_presence()
-            published = self._viewers_by_replica.copy()
             self._viewer_count_timer = asyncio.get_running_loop().call_later(
-                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, published
+                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, self.viewer_count
             )
 
-    def _publish_changed_count(self, published_counts: dict[str, int]) -> None:
+    def _publish_changed_count(self, published_count: int) -> None:
         self._viewer_count_timer = None
-        if published_counts != self._viewers_by_replica:
+        if published_count != self.viewer_count:
             self._schedule_presence()
 
     async def _run_ticks(self) -> None:

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 import msgpack
 
 from bunraku.codec.container import StoredMotion
+from bunraku.http.token_bucket import KeyedTokenBuckets
 from bunraku.messaging.bus import Subscription
 from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout.timeline import position_at
@@ -31,7 +32,10 @@ PUPPETEER_HEARTBEAT_S = 2.0
 """Interval between the heartbeats that a replica sends for a puppeteer."""
 PUPPETEER_TIMEOUT_US = 7_000_000
 """Silence after which a puppeteer is removed: the replica of the connection has died."""
-
+VIEWER_COUNT_TIMEOUT_US = 17_000_000
+"""Silence of a stream replica after which its viewers no longer count: it has died. It reports every 5 s."""
+JOINS_PER_S, JOIN_BURST = 2.0, 32
+"""Rate at which one subject may join a session, and the number of joins at once: every join is sent to all viewers."""
 
 _log = logging.getLogger(__name__)
 
@@ -56,10 +60,13 @@ class StageEndpoint:
         self.stage = stage
         self.revision = revision
         """Revision of the session's record in the key-value store."""
+        self.record_lock = asyncio.Lock()
+        """Lock of the record, held by the one request or task that changes it."""
         self._context = context
         self._clock = context.clock
         self._owner = owner
         self._subject = f"session.{stage.id}"
+        self._join_rate = KeyedTokenBuckets(JOINS_PER_S, JOIN_BURST)
         bus = context.bus
         self._subscriptions: list[Subscription] = [
             bus.subscribe(f"{self._subject}.said", self._receive),
@@ -74,7 +81,7 @@ class StageEndpoint:
                 )
             ),
         ]
-        self._sweep_task = asyncio.create_task(self._remove_silent_puppeteers(), name=f"puppeteers of {stage.id}")
+        self._sweep_task = asyncio.create_task(self._expire_participants(), name=f"participants of {stage.id}")
 
     async def close(self) -> None:
         """Stop responding, disconnect the puppeteers and close the stage."""
@@ -125,13 +132,17 @@ class StageEndpoint:
     async def _answer_end(self, _: None) -> None:
         await self._owner.end_session(self.stage.id)
 
-    async def _answer_join(self, values: list[str]) -> dict[str, Any]:
-        puppeteer_id, name = values
+    async def _answer_join(self, values: list[Any]) -> dict[str, Any]:
+        # replicas of earlier releases send no subject
+        puppeteer_id, name, subject = (*values, None)[:3]
+        if subject is not None and not self._join_rate.take(subject, self._clock() * 1e-6):
+            raise ProblemError(429, "Too many joins", "this link joins too often", hint="try again in a second")
         try:
             puppeteer = self.stage.join(
                 puppeteer_id,
                 name,
                 lambda message: self._context.bus.publish(f"{self._subject}.told.{puppeteer_id}", message),
+                subject,
             )
         except SessionFull as error:
             raise ProblemError(503, "Full", str(error)) from None
@@ -150,14 +161,15 @@ class StageEndpoint:
         elif packed:
             self.stage.receive(puppeteer, unpack(packed))
 
-    async def _remove_silent_puppeteers(self) -> None:
-        """Remove the puppeteers whose replica has died, until cancelled."""
+    async def _expire_participants(self) -> None:
+        """Remove the puppeteers and viewers whose replica has died, until cancelled."""
         while True:
             begin = self._clock()
             await asyncio.sleep(PUPPETEER_HEARTBEAT_S)
             now = self._clock()
             # while the event loop was blocked, no heartbeat could be received
             stalled_us = max(now - begin - round(PUPPETEER_HEARTBEAT_S * 1e6), 0)
+            self.stage.expire_viewer_counts(VIEWER_COUNT_TIMEOUT_US, stalled_us)
             for puppeteer in self.stage.puppeteers:
                 puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:

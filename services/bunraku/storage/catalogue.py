@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import TYPE_CHECKING
 
-from bunraku.storage.record import CatalogueEntry, Job, Quota, Share
+from bunraku.storage.record import CatalogueEntry, Job, JobHold, Quota, Share
 
 if TYPE_CHECKING:
     from bunraku.storage.catalogue_sql import SqlCatalogue
@@ -66,9 +66,13 @@ class Catalogue:
         """Add a job, held by the replica `holder` until clock time `held_until`; take over a job of the same id."""
         await (await self.open()).jobs.add(job, holder, held_until)
 
-    async def claim_job(self, holder: str, now: int, held_until: int) -> Job | None:
-        """Claim the oldest job whose holder's time has run out at clock time `now`; return None if there is none."""
-        return await (await self.open()).jobs.claim(holder, now, held_until)
+    async def list_job_holds(self, limit: int) -> dict[str, JobHold]:
+        """Return who holds the `limit` oldest jobs, by id, oldest first."""
+        return await (await self.open()).jobs.list_holds(limit)
+
+    async def claim_job(self, job_id: str, hold: JobHold, holder: str, held_until: int) -> Job | None:
+        """Claim a job that still has the hold `hold`; return None if another replica was faster."""
+        return await (await self.open()).jobs.claim(job_id, hold, holder, held_until)
 
     async def renew_jobs(self, holder: str, held_until: int) -> None:
         """Hold all jobs of a replica until clock time `held_until`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 
 class InvalidCursor(ValueError):
@@ -49,6 +49,13 @@ class Share:
     subject: str
     session: str | None = None
     motion: str | None = None
+
+
+class JobHold(NamedTuple):
+    """Hold of a replica on a job. `until` changes while the replica works; 0: the job is released."""
+
+    holder: str
+    until: int
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket import subprotocol
 from bunraku.websocket.connection import WebSocketConnection
-from bunraku.websocket.handoff import detach
+from bunraku.websocket.handoff import detach, reject
 from bunraku.websocket.link import link_of
 from bunraku.websocket.subprotocol import CloseConnection
 
@@ -121,7 +121,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             # the client left during the handshake
             pass
         except CloseConnection as reason:
-            await subprotocol.close_with_problem(socket, reason)
+            await reject(socket, reason)
 
     @app.websocket("/v1/sessions/{session}/stream")
     @requires(Role.VIEW)
@@ -151,7 +151,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             # the client left during the handshake
             pass
         except CloseConnection as reason:
-            await subprotocol.close_with_problem(socket, reason)
+            await reject(socket, reason)
 
     return app
 

@@ -37,7 +37,7 @@ class Link(Protocol):
     def probe(self, size: int, /) -> bytes:
         """Return the bytes to write directly after `size` bytes, so that their arrival can be measured."""
 
-    def receive_probe_echo(self, payload: bytes) -> None:
+    def receive_probe_echo(self, payload: bytes) -> bool:
         """Process the answer to a probe."""
 
     def set_corked(self, corked: bool) -> None:
@@ -152,14 +152,15 @@ class FlowControl:
         """Return the bytes to write together with `size` bytes of data; a size of 0 asks for a probe alone."""
         return b"" if self._link is None or (size and self.state.is_unlimited) else self._link.probe(size)
 
-    def on_probe_echo(self, payload: bytes) -> None:
-        """Process the client's answer to a probe."""
+    def on_probe_echo(self, payload: bytes) -> bool:
+        """Process the client's answer to a probe. Return False if it answers none."""
         if self._link is None:
-            return
+            return False
         was_unmeasured = self.is_unmeasured
-        self._link.receive_probe_echo(payload)
+        answers_probe = self._link.receive_probe_echo(payload)
         if was_unmeasured and 0 < self._link.sample().rtt_us <= HIGH_RTT_US:
             self.state = self.state.after_fast_echo()
+        return answers_probe
 
     def reassess(self) -> None:
         """Update the state; called now and then, not for each overlay."""

@@ -22,13 +22,14 @@ from bunraku.playout import timeline
 from bunraku.stream.context import StreamContext
 from bunraku.stream.counters import TIMEOUT_REASON
 from bunraku.stream.flow_control import FlowControl, Link
-from bunraku.stream.heartbeat import Heartbeat, QuietPeriod
 from bunraku.stream.motion_delivery import OVERLAY_SHARING_US, MotionFeed
+from bunraku.stream.quiet_period import QuietPeriod
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, SendQueue
 from bunraku.stream.sync_group import SEND_SPREAD_US, SyncGroups, SyncMembership
 from bunraku.stream.track_selection import ViewerOptions
 from bunraku.websocket.connection import CLOSED_CONNECTION, WebSocketConnection
 from bunraku.websocket.frame import encode_frame, frame_payload
+from bunraku.websocket.heartbeat import Heartbeat
 from bunraku.websocket.subprotocol import INTERNAL_ERROR, POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Data, Edit, Ping, Report, TimelineState, unpack
@@ -164,11 +165,12 @@ class ViewerConnection:
         elif isinstance(received, Edit) and self._has_own_timeline:
             self._edit(received)
 
-    def on_pong(self, payload: bytes) -> None:
+    def on_pong(self, payload: bytes) -> bool:
         """Handle the answer to a probe."""
-        self._flow.on_probe_echo(payload)
-        if self.connection.is_writable:
+        answers_probe = self._flow.on_probe_echo(payload)
+        if answers_probe and self.connection.is_writable:
             self._send_due(self._context.clock())
+        return answers_probe
 
     def on_pause(self) -> None:
         """Handle a connection that is no longer writable."""

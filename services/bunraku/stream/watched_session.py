@@ -29,6 +29,9 @@ from bunraku.wire.overlay import Overlay
 VIEWER_COUNT_INTERVAL_S = 0.5
 """Minimum time between two published viewer counts, seconds. Each is sent to every viewer, so that a thousand viewers
 that join within a second would otherwise cause a million messages."""
+VIEWER_COUNT_REFRESH_S = 5.0
+"""Interval at which an unchanged viewer count is published again, seconds: the stage forgets replicas that are silent
+for three intervals, as they have died."""
 
 _log = logging.getLogger(__name__)
 
@@ -65,6 +68,7 @@ class WatchedSession:
         self._close_reason: CloseConnection | None = None
         self._motion_task: asyncio.Task[None] | None = None
         self._count_timer: asyncio.TimerHandle | None = None
+        self._refresh_timer: asyncio.TimerHandle | None = None
         self._published_count = 0
         timeline, presence, overlay = msgpack.unpackb(state)
         self._overlay: bytes | None = None if overlay is None else encode_frame(overlay)
@@ -138,6 +142,8 @@ class WatchedSession:
         if self._count_timer is not None:
             self._count_timer.cancel()
         self._publish_count(0)
+        if self._refresh_timer is not None:
+            self._refresh_timer.cancel()
 
     def _publish_count_throttled(self, viewers: int) -> None:
         """Publish the number of viewers, now or at the end of the interval."""
@@ -153,7 +159,15 @@ class WatchedSession:
     def _publish_count(self, viewers: int) -> None:
         if self._published_count != viewers:
             self._published_count = viewers
-            self._source.bus.publish(f"{self._subject}.viewers", msgpack.packb([self._source.replica, viewers]))
+            self._send_count()
+
+    def _send_count(self) -> None:
+        """Publish the count now, and again after `VIEWER_COUNT_REFRESH_S`."""
+        if self._refresh_timer is not None:
+            self._refresh_timer.cancel()
+        self._refresh_timer = asyncio.get_running_loop().call_later(VIEWER_COUNT_REFRESH_S, self._send_count)
+        message = msgpack.packb([self._source.replica, self._published_count])
+        self._source.bus.publish(f"{self._subject}.viewers", message)
 
     def _on_timeline(self, message: bytes) -> None:
         self._timeline = _parse_timeline(message)

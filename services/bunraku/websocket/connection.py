@@ -12,9 +12,11 @@ import asyncio
 import contextlib
 import socket
 from collections.abc import Callable
-from typing import Protocol, cast
+from typing import NamedTuple, Protocol, cast
 
 from bunraku.runtime.clock import clock
+from bunraku.runtime.token_bucket import TokenBucket
+from bunraku.runtime.transport import LingeringClose, WriteDeadline
 from bunraku.websocket.frame import (
     MESSAGE_TOO_BIG,
     ClientFrameParser,
@@ -34,14 +36,28 @@ SEND_BUFFER_BYTES = 32 << 10
 the overhead of its buffers. Data in this buffer cannot be replaced when newer data is to be sent."""
 
 
+class FrameLimit(NamedTuple):
+    """Limit on the frames and reads of one connection: so many per second, and so many at once.
+
+    A client above it is disconnected. Pongs that answer a Ping of this side do not count.
+    """
+
+    rate: float
+    burst: float
+
+
+VIEWER_FRAMES = FrameLimit(60.0, 240.0)
+"""Limit of a viewer, which sends some messages per second."""
+
+
 class ConnectionListener(Protocol):
     """Owner of a connection, called for its events."""
 
     def on_message(self, message: bytes) -> None:
         """Handle a binary message. Raise `CloseConnection` to close the connection."""
 
-    def on_pong(self, payload: bytes) -> None:
-        """Handle a Pong with a payload."""
+    def on_pong(self, payload: bytes) -> bool:
+        """Handle a Pong with a payload. Return whether it answers a Ping."""
 
     def on_pause(self) -> None:
         """Handle that the connection is no longer writable: the transport has buffered data."""
@@ -64,9 +80,11 @@ class WebSocketConnection(asyncio.Protocol):
         "_clock",
         "_close_timer",
         "_connections",
+        "_frames",
         "_listener",
         "_parser",
         "_transport",
+        "_write_deadline",
         "file_descriptor",
         "is_writable",
         "last_received_at",
@@ -80,6 +98,7 @@ class WebSocketConnection(asyncio.Protocol):
         listener: ConnectionListener,
         connections: set[object],
         clock: Callable[[], int] = clock,
+        limit: FrameLimit = VIEWER_FRAMES,
     ) -> None:
         """Take over `transport`. The server calls `shutdown` on all members of `connections` when it stops."""
         self._transport = transport
@@ -88,8 +107,10 @@ class WebSocketConnection(asyncio.Protocol):
         self._clock = clock
         self._parser = ClientFrameParser(MAX_CLIENT_MESSAGE_BYTES)
         self._close_timer: asyncio.TimerHandle | None = None
+        self._write_deadline: WriteDeadline | None = None
         self.is_writable = True
         self.last_received_at = clock()
+        self._frames = TokenBucket(*limit, self.last_received_at * 1e-6)
         self.on_ended: Callable[[], None] | None = None
         """Called once when the connection has ended, before `ConnectionListener.on_close`."""
         self.write = transport.write
@@ -142,28 +163,43 @@ class WebSocketConnection(asyncio.Protocol):
         if self._close_timer is not None:
             return
         self.write(final_bytes)
-        self.pause_writing()
+        self.is_writable = False
+        self._listener.on_pause()
         # closing a socket with unread input at once would discard the bytes just written
         self._close_timer = asyncio.get_running_loop().call_later(CLOSE_TIMEOUT_S, self._transport.abort)
 
     def data_received(self, data: bytes) -> None:
         self.last_received_at = self._clock()
+        frames, ping = self._parser.parse(data), None
         try:
-            for opcode, payload in self._parser.parse(data):
-                self._handle_frame(opcode, payload)
+            # tiny segments cost as much as frames
+            self._count_frame()
+            for opcode, payload in frames:
+                self._count_frame()
+                if opcode == Opcode.PING:
+                    ping = payload
+                else:
+                    self._handle_frame(opcode, payload)
         except FrameError as error:
             title = "Too large" if error.code == MESSAGE_TOO_BIG else "Broken frame"
-            self.close_with_problem(CloseConnection(error.code, title, error.detail))
-            # the parser has lost the frame boundaries, so it cannot recognise the client's Close frame
-            self._transport.close()
+            self._reject(CloseConnection(error.code, title, error.detail))
+        except _TooManyFrames:
+            self._reject(CloseConnection(POLICY_VIOLATION, "Too many messages", "messages arrive too fast; send fewer"))
         except CloseConnection as reason:
             self.close_with_problem(reason)
+        finally:
+            frames.close()
+        if ping is not None and self.is_writable and self._close_timer is None:
+            # one Pong for the most recent Ping (RFC 6455, section 5.5.3)
+            self.write(encode_frame(ping, Opcode.PONG))
+
+    def _count_frame(self) -> None:
+        if not self._frames.take(self.last_received_at * 1e-6):
+            raise _TooManyFrames
 
     def _handle_frame(self, opcode: Opcode, payload: bytes) -> None:
         if opcode == Opcode.CLOSE:
-            if self._close_timer is None:
-                self.write(encode_close_frame(parse_close_code(payload)))
-                self.pause_writing()
+            self._close(encode_close_frame(parse_close_code(payload)))
             self._transport.close()
         elif self._close_timer is not None or self._transport.is_closing():
             return
@@ -171,16 +207,24 @@ class WebSocketConnection(asyncio.Protocol):
             self._listener.on_message(payload)
         elif opcode == Opcode.TEXT:
             raise CloseConnection(POLICY_VIOLATION, "Text", "received a text message; messages are binary")
-        elif opcode == Opcode.PING and self.is_writable:
-            self.write(encode_frame(payload, Opcode.PONG))
-        elif opcode == Opcode.PONG and payload:
-            self._listener.on_pong(payload)
+        elif opcode == Opcode.PONG and payload and self._listener.on_pong(payload):
+            self._frames.give_back()
+
+    def _reject(self, reason: CloseConnection) -> None:
+        """Close the connection of a client whose input is not parsed any more."""
+        self.close_with_problem(reason)
+        LingeringClose(self._transport, self.connection_lost)
 
     def pause_writing(self) -> None:
         self.is_writable = False
+        if self._write_deadline is None:
+            self._write_deadline = WriteDeadline(self._transport)
+        self._write_deadline.start()
         self._listener.on_pause()
 
     def resume_writing(self) -> None:
+        if self._write_deadline is not None:
+            self._write_deadline.stop()
         if self._close_timer is None and not self._transport.is_closing():
             self.is_writable = True
             self._listener.on_resume()
@@ -190,9 +234,15 @@ class WebSocketConnection(asyncio.Protocol):
         self._connections.discard(self)
         if self._close_timer is not None:
             self._close_timer.cancel()
+        if self._write_deadline is not None:
+            self._write_deadline.stop()
         if self.on_ended is not None:
             self.on_ended()
         self._listener.on_close()
+
+
+class _TooManyFrames(Exception):
+    pass
 
 
 class _ClosedConnection:

@@ -7,12 +7,13 @@ Messages of viewers are short and rare, so the parser keeps a few bytes of state
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from enum import IntEnum
 
 MAX_CONTROL_BYTES = 125
 """Maximum payload of a control frame (RFC 6455, section 5.5)."""
 PROTOCOL_ERROR = 1002
+INVALID_PAYLOAD = 1007
 MESSAGE_TOO_BIG = 1009
 _VALID_CLOSE_CODES = frozenset((1000, 1001, 1002, 1003, *range(1007, 1015), *range(3000, 5000)))
 """Codes that may be sent in a Close frame (RFC 6455, section 7.4)."""
@@ -65,12 +66,19 @@ def encode_close_frame(code: int, reason: str = "") -> bytes:
 def parse_close_code(payload: bytes) -> int:
     """Return the code with which to answer a client's Close frame.
 
-    It is the client's code, 1000 if the payload is empty, and 1002 for a code that must not be sent.
+    It is the client's code, 1000 if the payload is empty, 1002 for a code that must not be sent, and 1007 for a reason
+    that is not UTF-8 (RFC 6455, section 7.4.1).
     """
     if not payload:
         return 1000
     code = int.from_bytes(payload[:2], "big")
-    return code if len(payload) > 1 and code in _VALID_CLOSE_CODES else PROTOCOL_ERROR
+    if len(payload) < 2 or code not in _VALID_CLOSE_CODES:
+        return PROTOCOL_ERROR
+    try:
+        payload[2:].decode()
+    except UnicodeDecodeError:
+        return INVALID_PAYLOAD
+    return code
 
 
 class ClientFrameParser:
@@ -84,13 +92,27 @@ class ClientFrameParser:
         self._fragments: bytes | None = None
         self._message_opcode = Opcode.BINARY
 
-    def parse(self, data: bytes) -> Iterator[tuple[Opcode, bytes]]:
+    def parse(self, data: bytes) -> Generator[tuple[Opcode, bytes], None, None]:
         """Yield the opcode and payload of each message and control frame that `data` completes.
 
-        Raises `FrameError`. The parser must not be used after that.
+        A caller that stops before the end closes the generator; the next call continues there. Raises `FrameError`;
+        the parser must not be used after that.
         """
         if self._buffer:
-            data, self._buffer = self._buffer + data, b""
+            data = self._buffer + data
+        at = 0
+        try:
+            for end, opcode, payload, final in self._parse_frames(data):
+                at = end
+                if opcode >= Opcode.CLOSE:
+                    yield Opcode(opcode), payload
+                elif (message := self._assemble_message(opcode, payload, final=final)) is not None:
+                    yield message
+        finally:
+            self._buffer = data[at:]
+
+    def _parse_frames(self, data: bytes) -> Iterator[tuple[int, int, bytes, bool]]:
+        """Yield the end, opcode, payload and final bit of each complete frame."""
         at, end = 0, len(data)
         while end - at >= 2:
             head, size, body = data[at], data[at + 1], at + 2
@@ -115,11 +137,7 @@ class ClientFrameParser:
                 break
             payload = _unmask(data[body + 4 : body + 4 + size], data[body : body + 4])
             at = body + 4 + size
-            if opcode >= Opcode.CLOSE:
-                yield Opcode(opcode), payload
-            elif (message := self._assemble_message(opcode, payload, final=bool(head & 0x80))) is not None:
-                yield message
-        self._buffer = data[at:]
+            yield at, opcode, payload, bool(head & 0x80)
 
     def _assemble_message(self, opcode: int, payload: bytes, *, final: bool) -> tuple[Opcode, bytes] | None:
         """Add a fragment. Return the message if this was its last one."""

@@ -7,18 +7,24 @@ application writes to the transport and receives its data directly.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 from collections.abc import Callable
-from typing import cast
+from typing import Any, cast
 
-from starlette.websockets import WebSocket, WebSocketDisconnect
+from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
 from bunraku.runtime.clock import clock
-from bunraku.websocket import link
-from bunraku.websocket.connection import ConnectionListener, WebSocketConnection
+from bunraku.websocket import link, subprotocol
+from bunraku.websocket.connection import VIEWER_FRAMES, ConnectionListener, FrameLimit, WebSocketConnection
+from bunraku.websocket.subprotocol import CloseConnection
 
 HANDOFF_EXTENSION = "bunraku.take"
+HANDSHAKE_TIMEOUT_S = 30.0
+"""Time from the request to the response of a handshake, of which most is for backends."""
+REJECTED_FRAMES = FrameLimit(1.0, 16.0)
+"""Limit of a rejected client, of which only a Close frame is expected."""
 
 
 class _DetachedTransport(asyncio.Transport):
@@ -37,9 +43,27 @@ _DETACHED_TRANSPORT = _DetachedTransport()
 class HandoffProtocol(WebSocketsSansIOProtocol):
     """uvicorn's WebSocket protocol with the hand-off extension.
 
-    It uses attributes of the base class that uvicorn does not document; `pyproject.toml` bounds its version, and
+    It reads nothing from the client: every accepted connection is handed over, and a rejected one is closed. It uses
+    attributes of the base class that uvicorn does not document; `pyproject.toml` bounds its version, and
     `tests/test_library_interfaces.py` checks them.
     """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._handshake_timer: asyncio.TimerHandle | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        super().connection_made(transport)
+        self.transport.pause_reading()
+        self._handshake_timer = self.loop.call_later(HANDSHAKE_TIMEOUT_S, self.transport.abort)
+
+    def handle_parser_exception(self) -> None:
+        # only the handshake is parsed here
+        self.transport.abort()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._cancel_timeout()
+        super().connection_lost(exc)
 
     def handle_connect(self, event: Request) -> None:
         # the application's task starts after this call, so it sees the extensions
@@ -50,23 +74,33 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
             extensions[HANDOFF_EXTENSION] = {"take": self.detach}
             extensions[link.LINK_EXTENSION] = {"transport": self.transport}
 
-    def detach(self, listener: ConnectionListener, clock: Callable[[], int]) -> WebSocketConnection | None:
-        """Return the accepted connection, None if it has ended.
-
-        Raises RuntimeError if data was already read from it.
-        """
+    def detach(
+        self, listener: ConnectionListener, clock: Callable[[], int], limit: FrameLimit
+    ) -> WebSocketConnection | None:
+        """Return the accepted connection, None if it has ended."""
         transport = self.transport
         if not self.handshake_complete or self.close_sent or self.disconnected or transport.is_closing():
             return None
-        if not self.queue.empty() or self.conn.reader.buffer:
-            raise RuntimeError("data was read from the connection before its hand-off")
+        self._cancel_timeout()
         self.stop_keepalive()
         self.connections.discard(self)
         self.transport = _DETACHED_TRANSPORT
-        return WebSocketConnection(transport, listener, cast(set[object], self.connections), clock)
+        connection = WebSocketConnection(transport, listener, cast(set[object], self.connections), clock, limit)
+        transport.resume_reading()
+        return connection
+
+    def _cancel_timeout(self) -> None:
+        if self._handshake_timer is not None:
+            self._handshake_timer.cancel()
+            self._handshake_timer = None
 
 
-def detach(socket: WebSocket, listener: ConnectionListener, clock: Callable[[], int] = clock) -> WebSocketConnection:
+def detach(
+    socket: WebSocket,
+    listener: ConnectionListener,
+    clock: Callable[[], int] = clock,
+    limit: FrameLimit = VIEWER_FRAMES,
+) -> WebSocketConnection:
     """Take over an accepted WebSocket. The caller must not await anything between accepting it and this call.
 
     Raises `WebSocketDisconnect` if the client has disconnected, RuntimeError if the server does not use
@@ -75,7 +109,40 @@ def detach(socket: WebSocket, listener: ConnectionListener, clock: Callable[[], 
     extension = (socket.scope.get("extensions") or {}).get(HANDOFF_EXTENSION)
     if extension is None:
         raise RuntimeError("run uvicorn with the options of bunraku.serve.uvicorn_protocol_options()")
-    connection: WebSocketConnection | None = extension["take"](listener, clock)
+    connection: WebSocketConnection | None = extension["take"](listener, clock, limit)
     if connection is None:
         raise WebSocketDisconnect(1006)
     return connection
+
+
+async def reject(socket: WebSocket, reason: CloseConnection) -> None:
+    """Send a Problem message and close the connection. Accept it first if necessary.
+
+    Does nothing if the client has already disconnected.
+    """
+    with contextlib.suppress(WebSocketDisconnect):
+        if socket.application_state is WebSocketState.CONNECTING:
+            try:
+                await subprotocol.accept(socket)
+            except CloseConnection as unsupported:
+                reason = unsupported
+        detach(socket, _RejectedClient(), limit=REJECTED_FRAMES).close_with_problem(reason)
+
+
+class _RejectedClient:
+    """Listener for a connection that is closing."""
+
+    def on_message(self, message: bytes) -> None:
+        pass
+
+    def on_pong(self, payload: bytes) -> bool:  # noqa: ARG002
+        return False
+
+    def on_pause(self) -> None:
+        pass
+
+    def on_resume(self) -> None:
+        pass
+
+    def on_close(self) -> None:
+        pass

@@ -86,8 +86,9 @@ class TcpLink:
         """Return no bytes: the kernel tracks acknowledgements."""
         return b""
 
-    def receive_probe_echo(self, payload: bytes) -> None:
+    def receive_probe_echo(self, payload: bytes) -> bool:  # noqa: ARG002
         """Ignore a Pong: `probe` sends no Ping."""
+        return False
 
     def set_corked(self, corked: bool) -> None:
         """Hold written data until a packet is full, for at most 200 ms, or release it.
@@ -146,8 +147,8 @@ class AckedLink:
         self._pending_pings.append((self._written_bytes, self._clock()))
         return encode_frame(_ECHO_PAYLOAD.pack(self._written_bytes & 0xFFFF_FFFF), Opcode.PING)
 
-    def receive_probe_echo(self, payload: bytes) -> None:
-        """Handle a Pong. Ignore it if it answers no pending Ping."""
+    def receive_probe_echo(self, payload: bytes) -> bool:
+        """Handle a Pong. Return False if it answers no pending Ping."""
         for index, (written_bytes, sent_at) in enumerate(self._pending_pings):
             if payload == _ECHO_PAYLOAD.pack(written_bytes & 0xFFFF_FFFF):
                 for _ in range(index + 1):
@@ -155,7 +156,8 @@ class AckedLink:
                 self._acked_bytes = written_bytes
                 self._rtt_us = max(self._clock() - sent_at, 1)
                 self._min_rtt_us = min(self._min_rtt_us or self._rtt_us, self._rtt_us)
-                return
+                return True
+        return False
 
 
 def link_of(ws: WebSocket, clock: Callable[[], int] = clock) -> TcpLink | AckedLink | None:

@@ -1,17 +1,11 @@
-"""Subprotocol `bunraku.v1` on ASGI WebSockets: accept, receive, and close with a reason (proto/SPEC.md)."""
+"""Subprotocol `bunraku.v1`: its acceptance, and the reasons to close a connection (proto/SPEC.md)."""
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-from collections.abc import Coroutine
-from typing import Any
-
-from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from starlette.websockets import WebSocket
 
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.websocket.frame import MESSAGE_TOO_BIG
-from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, SUBPROTOCOL, Problem
+from bunraku.wire.messages import SUBPROTOCOL
 
 UNAUTHORIZED = 4401
 FORBIDDEN = 4403
@@ -44,54 +38,3 @@ async def accept(socket: WebSocket) -> None:
             UNSUPPORTED_SUBPROTOCOL, "Subprotocol", f"connect with the WebSocket subprotocol {SUBPROTOCOL}"
         )
     await socket.accept(SUBPROTOCOL)
-
-
-async def run_until_first_ends(*coroutines: Coroutine[Any, Any, None]) -> None:
-    """Run coroutines until one ends, then cancel the others.
-
-    Raises the exception of the one that ended, except `WebSocketDisconnect`.
-    """
-    tasks = [asyncio.create_task(coroutine) for coroutine in coroutines]
-    try:
-        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for task in tasks:
-            task.cancel()
-        results = await asyncio.gather(*tasks, return_exceptions=True)
-    for result in results:
-        if isinstance(result, BaseException) and not isinstance(result, asyncio.CancelledError | WebSocketDisconnect):
-            raise result
-
-
-async def close_with_problem(socket: WebSocket, reason: CloseConnection) -> None:
-    """Send a Problem message and close the connection. Accept it first if necessary.
-
-    Does nothing if the client has already disconnected.
-    """
-    with contextlib.suppress(WebSocketDisconnect, RuntimeError):
-        if socket.application_state is WebSocketState.CONNECTING:
-            try:
-                await accept(socket)
-            except CloseConnection as unsupported:
-                reason = unsupported
-        await socket.send_bytes(Problem(reason.title, reason.detail).pack())
-        await socket.close(reason.code, f"{reason.title}: {reason.detail}"[:120])
-
-
-async def receive(socket: WebSocket) -> bytes:
-    """Return the next message of the client.
-
-    Raises `CloseConnection` for a text message and for one that is too long, `WebSocketDisconnect` when the connection
-    has ended.
-    """
-    event = await socket.receive()
-    if event["type"] == "websocket.disconnect":
-        raise WebSocketDisconnect(event.get("code", 1005))
-    data = event.get("bytes")
-    if data is None:
-        raise CloseConnection(POLICY_VIOLATION, "Text", "received a text message; messages are binary")
-    if len(data) > MAX_CLIENT_MESSAGE_BYTES:
-        raise CloseConnection(
-            MESSAGE_TOO_BIG, "Too large", f"a message has {len(data)} bytes; the limit is {MAX_CLIENT_MESSAGE_BYTES}"
-        )
-    return bytes(data)

@@ -1,17 +1,9 @@
-"""Ping timing of one viewer: the heartbeat, and quiet periods for clock samples.
-
-All times are clock times in microseconds.
-"""
+"""Quiet periods for the clock samples of one viewer. All times are clock times in microseconds."""
 
 from __future__ import annotations
 
 from bunraku.stream.flow_control import FlowControl
-from bunraku.websocket.connection import WebSocketConnection
 
-PING_AFTER_US = 12_000_000
-"""A viewer that has been silent for this long is sent a WebSocket Ping, microseconds."""
-HEARTBEAT_TIMEOUT_US = 18_000_000
-"""A viewer that has been silent for this long is disconnected, microseconds."""
 QUIET_MARGIN_US = 15_000
 """Added to the estimated time in which a link drains, microseconds."""
 MAX_QUIET_PERIOD_US = 500_000
@@ -20,32 +12,6 @@ QUIET_INTERVAL_US = 2_000_000
 """Minimum time between the starts of two quiet periods, microseconds."""
 INITIAL_QUIET_PERIODS = 4
 """The first quiet periods are allowed at a quarter of the interval."""
-
-
-class Heartbeat:
-    """Detection of a viewer that no longer answers."""
-
-    __slots__ = ("_pinged_at",)
-
-    def __init__(self) -> None:
-        # `last_received_at` of the connection when the last Ping was sent
-        self._pinged_at = 0
-
-    def check(self, connection: WebSocketConnection, now: int) -> bool:
-        """Return False if the viewer has timed out; send one Ping if it has been silent for long."""
-        silence = now - connection.last_received_at
-        if PING_AFTER_US < silence <= HEARTBEAT_TIMEOUT_US and connection.last_received_at != self._pinged_at:
-            self._pinged_at = connection.last_received_at
-            connection.send_ping()
-        return silence <= HEARTBEAT_TIMEOUT_US
-
-    def next_check(self, connection: WebSocketConnection) -> int:
-        """Return the time of the next check."""
-        return (
-            connection.last_received_at
-            + (HEARTBEAT_TIMEOUT_US if connection.last_received_at == self._pinged_at else PING_AFTER_US)
-            + 1
-        )
 
 
 class QuietPeriod:

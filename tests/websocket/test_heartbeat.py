@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from bunraku.stream.heartbeat import HEARTBEAT_TIMEOUT_US, PING_AFTER_US, Heartbeat
 from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.heartbeat import HEARTBEAT_TIMEOUT_US, PING_AFTER_US, Heartbeat
 from tests.stream.fake_transport import FakeTransport
 
 RECEIVED_AT = 10**9
@@ -10,7 +10,7 @@ RECEIVED_AT = 10**9
 class NullListener:
     def on_message(self, message: bytes) -> None: ...
 
-    def on_pong(self, payload: bytes) -> None: ...
+    def on_pong(self, payload: bytes) -> bool: ...
 
     def on_pause(self) -> None: ...
 

@@ -1,0 +1,170 @@
+"""uvicorn's HTTP protocol with bounds: on request heads, on the time for them, on parsing, and on slow readers."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import time
+from http import HTTPStatus
+from typing import Any, ClassVar
+
+import h11
+from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from bunraku.http.problem_details import MEDIA_TYPE
+from bunraku.http.request_head import BoundedConnection
+from bunraku.runtime.transport import LingeringClose, WriteDeadline
+
+HEADER_TIMEOUT_S = 10.0
+"""Time for complete request headers, from the start of the connection or the first byte. Also the time for the rest of
+a body after the response; closing the connection at once would discard the response."""
+MAX_PENDING_CONNECTIONS = 1_000
+"""Connections of a process that wait for request headers. The one that has waited longest makes room for a new one."""
+MIN_PARSE_BYTES = 1 << 10
+MAX_PARSE_BYTES = 64 << 10
+"""Least and most bytes that are parsed at once. A piece of chunked data may take a thousand times longer than its size
+suggests, so the number adapts to the time that the last piece took."""
+PARSE_TIME_S = 1e-3
+"""Time after which parsing of a connection's data pauses for other connections."""
+
+_log = logging.getLogger(__name__)
+# the base class warns of each malformed request; clients get the reason, and the log stays readable
+_log.setLevel(logging.ERROR)
+
+
+class HttpProtocol(H11Protocol):
+    """HTTP protocol of a server with untrusted clients.
+
+    A connection whose request headers are late, or whose client does not read its responses, is aborted. It overrides
+    methods of the base class that uvicorn does not document; `pyproject.toml` bounds its version, and
+    `tests/test_library_interfaces.py` checks them.
+    """
+
+    _pending: ClassVar[dict[HttpProtocol, None]] = {}
+    """Connections of this process that wait for request headers, the oldest first."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.logger = _log
+        self.conn: BoundedConnection = BoundedConnection()
+        self._header_timer: asyncio.TimerHandle | None = None
+        self._unparsed = bytearray()
+        self._parse_bytes = MIN_PARSE_BYTES
+
+    def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        super().connection_made(transport)
+        # responses continue when the buffer is empty
+        transport.set_write_buffer_limits(0, 0)
+        self._write_deadline = WriteDeadline(transport)
+        self._start_timeout()
+
+    def data_received(self, data: bytes) -> None:
+        is_parsing = bool(self._unparsed)
+        self._unparsed += data
+        if not is_parsing:
+            self._parse()
+        elif len(self._unparsed) > MAX_PARSE_BYTES:
+            self.transport.pause_reading()
+
+    def on_response_complete(self) -> None:
+        super().on_response_complete()
+        if self.conn.their_state is h11.SEND_BODY:
+            self._update_timeout()
+
+    def handle_websocket_upgrade(self, event: h11.Request) -> None:
+        self._cancel_timeout()
+        self._write_deadline.stop()
+        self._unparsed.clear()
+        super().handle_websocket_upgrade(event)
+
+    def send_400_response(self, msg: str) -> None:
+        """Answer a request that cannot be parsed, and end the connection."""
+        if self.conn.our_state not in (h11.IDLE, h11.SEND_RESPONSE):
+            # a response has begun
+            self.transport.abort()
+            return
+        self._cancel_timeout()
+        self._unparsed.clear()
+        self.transport.write(self._error_response(msg))
+        LingeringClose(self.transport, self.connection_lost)
+
+    def pause_writing(self) -> None:
+        super().pause_writing()
+        self._write_deadline.start()
+
+    def resume_writing(self) -> None:
+        super().resume_writing()
+        self._write_deadline.stop()
+
+    def connection_lost(self, exc: Exception | None) -> None:
+        self._cancel_timeout()
+        self._write_deadline.stop()
+        self._unparsed.clear()
+        super().connection_lost(exc)
+
+    def _parse(self) -> None:
+        """Parse received data for about `PARSE_TIME_S`, and the rest after the events of other connections."""
+        begun_at = piece_begun_at = time.perf_counter()
+        while self._unparsed:
+            piece = bytes(self._unparsed[: self._parse_bytes])
+            del self._unparsed[: len(piece)]
+            super().data_received(piece)
+            if self.transport.get_protocol() is not self:
+                return
+            now = time.perf_counter()
+            if now - piece_begun_at > PARSE_TIME_S:
+                self._parse_bytes = MIN_PARSE_BYTES
+            elif now - piece_begun_at < PARSE_TIME_S / 4:
+                self._parse_bytes = min(2 * self._parse_bytes, MAX_PARSE_BYTES)
+            piece_begun_at = now
+            if self._unparsed and now - begun_at > PARSE_TIME_S:
+                self.transport.pause_reading()
+                self.loop.call_soon(self._continue_parsing)
+                break
+        self._update_timeout()
+
+    def _continue_parsing(self) -> None:
+        if self.transport.is_closing():
+            self._unparsed.clear()
+            return
+        self._parse()
+        if not self._unparsed and not self.flow.read_paused and self.transport.get_protocol() is self:
+            self.transport.resume_reading()
+
+    def _error_response(self, detail: str) -> bytes:
+        """Return the response to a request that cannot be parsed, as a problem document."""
+        error = self.conn.error
+        status = HTTPStatus(error.error_status_hint if error is not None else HTTPStatus.BAD_REQUEST)
+        problem = {"type": "about:blank", "status": status, "title": status.phrase, "detail": str(error or detail)}
+        body = json.dumps(problem).encode()
+        headers = [("content-type", MEDIA_TYPE), ("content-length", str(len(body))), ("connection", "close")]
+        events = (
+            h11.Response(status_code=status, headers=headers, reason=status.phrase.encode()),
+            h11.Data(data=body),
+            h11.EndOfMessage(),
+        )
+        return b"".join(self.conn.send(event) or b"" for event in events)
+
+    def _update_timeout(self) -> None:
+        """Start or cancel the timer according to the state of the HTTP connection."""
+        client_state = self.conn.their_state
+        if client_state is h11.IDLE or (client_state is h11.SEND_BODY and self.conn.our_state is h11.DONE):
+            if self._header_timer is None and self.transport.get_protocol() is self and not self.transport.is_closing():
+                self._start_timeout()
+        else:
+            self._cancel_timeout()
+
+    def _start_timeout(self) -> None:
+        if len(self._pending) >= MAX_PENDING_CONNECTIONS:
+            oldest = next(iter(self._pending))
+            oldest._cancel_timeout()
+            oldest.transport.abort()
+        self._pending[self] = None
+        self._header_timer = self.loop.call_later(HEADER_TIMEOUT_S, self.transport.abort)
+
+    def _cancel_timeout(self) -> None:
+        if self._header_timer is not None:
+            self._header_timer.cancel()
+            self._header_timer = None
+            del self._pending[self]

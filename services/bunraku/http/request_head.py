@@ -1,0 +1,65 @@
+"""Checks of a request's head beyond those of h11, before anything acts on it."""
+
+from __future__ import annotations
+
+import h11
+
+MAX_HEAD_BYTES = 16 << 10
+"""Maximum size of the request line and header fields."""
+MAX_TARGET_BYTES = 8_000
+"""Maximum size of the request target, the least that RFC 9112, section 3, recommends to support."""
+MAX_FIELD_BYTES = 8_000
+"""Maximum size of one header field."""
+MAX_FIELDS = 100
+"""Maximum number of header fields."""
+
+
+class BoundedConnection(h11.Connection):
+    """Server side of an HTTP/1.1 connection that rejects heads which are too large or ambiguous.
+
+    `next_event` raises `h11.RemoteProtocolError` with the status of the response, and `error` keeps it.
+    """
+
+    def __init__(self) -> None:
+        super().__init__(h11.SERVER, MAX_HEAD_BYTES)
+        self.error: h11.RemoteProtocolError | None = None
+
+    def next_event(self) -> h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]:
+        try:
+            event = super().next_event()
+            if isinstance(event, h11.Request):
+                check_request_head(event)
+                if _is_websocket_upgrade(event) and self.trailing_data[0]:
+                    _reject("data follows a WebSocket handshake before its response", 400)
+        except h11.RemoteProtocolError as error:
+            self.error = error
+            raise
+        return event
+
+
+def check_request_head(request: h11.Request) -> None:
+    """Raise `h11.RemoteProtocolError` for a head that is not acceptable."""
+    names = [name for name, _ in request.headers]
+    if len(names) > MAX_FIELDS:
+        _reject(f"a request has at most {MAX_FIELDS} header fields", 431)
+    if len(request.target) > MAX_TARGET_BYTES:
+        _reject(f"a request target has at most {MAX_TARGET_BYTES} bytes", 414)
+    sizes = [len(name) + len(value) for name, value in request.headers]
+    if max(sizes, default=0) > MAX_FIELD_BYTES:
+        _reject(f"a header field has at most {MAX_FIELD_BYTES} bytes", 431)
+    if len(request.target) + sum(sizes) + 4 * len(sizes) > MAX_HEAD_BYTES:
+        _reject(f"the head of a request has at most {MAX_HEAD_BYTES} bytes", 431)
+    has_length, has_encoding = b"content-length" in names, b"transfer-encoding" in names
+    if has_length and has_encoding:
+        # proxies disagree about where such a request ends (RFC 9112, section 6.1)
+        _reject("a request has either Content-Length or Transfer-Encoding", 400)
+    if _is_websocket_upgrade(request) and (has_length or has_encoding):
+        _reject("a WebSocket handshake has no body", 400)
+
+
+def _is_websocket_upgrade(request: h11.Request) -> bool:
+    return any(name == b"upgrade" and b"websocket" in value.lower() for name, value in request.headers)
+
+
+def _reject(detail: str, status: int) -> None:
+    raise h11.RemoteProtocolError(detail, error_status_hint=status)
