@@ -24,7 +24,8 @@ def main() -> int:
         duration = time.perf_counter() - started
         print(
             f"seed {seed}: {outcome.violation or 'no violation'} ({outcome.virtual_us * 1e-6:.1f} s of virtual time, "
-            f"{outcome.steps} steps, {duration:.2f} s)"
+            f"{outcome.steps} steps, {duration:.2f} s)",
+            flush=True,
         )
         failed += outcome.violation is not None
     return 1 if failed else 0

@@ -15,6 +15,8 @@ from tests.simulation.world import World
 
 TAKEOVER_US = round((REPLICA_TIMEOUT_S + 2 * HEARTBEAT_INTERVAL_S + 1.5) * 1e6)
 """Time after the loss of a replica in which its sessions continue elsewhere."""
+RESTART_US = 2_000_000
+"""Time after the start of a replica in which clients use it."""
 VIEWER_RECOVERY_US = round((SILENCE_TIMEOUT_S + 2 * RETRY_INTERVAL_S) * 1e6)
 """Time in which a viewer replaces a connection that it lost."""
 SPLIT_US = round((2 * HEARTBEAT_INTERVAL_S + 0.5) * 1e6)
@@ -61,17 +63,17 @@ class Faults:
             return
         self._world.note(f"kill {replica.node.name} for {delay} us")
         replica.kill()
-        self._last(delay + TAKEOVER_US)
+        self._last(max(delay + RESTART_US, TAKEOVER_US))
         self._later(delay, lambda: self._restart(replica))
 
     def stop_replica(self) -> None:
         """Stop a replica as at a rolling update and start it again."""
-        replica, delay = self._choose_replica(), self._random.randrange(3_000_000, 4_000_000)
+        replica, delay = self._choose_replica(), self._random.randrange(2_500_000, 3_500_000)
         if replica is None:
             return
         self._world.note(f"stop {replica.node.name} for {delay} us")
         replica.stop()
-        self._last(delay + TAKEOVER_US)
+        self._last(delay + RESTART_US)
         self._later(delay, lambda: self._restart(replica))
 
     def cut_replica(self) -> None:

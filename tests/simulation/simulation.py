@@ -19,15 +19,17 @@ from tests.simulation.model import Model
 from tests.simulation.operation import LIMB_COUNT, Operations
 from tests.simulation.world import Violation, World
 
-FAULT_PHASE_US = 2_500_000
+FAULT_PHASE_US = 2_000_000
 """Time in which faults begin."""
 OPERATION_INTERVALS_US = (40_000, 80_000, 160_000)
 FAULT_INTERVALS_US = (300_000, 600_000, 1_200_000)
 """Mean time between two operations, and between two faults; one for each seed."""
 CONVERGENCE_US = 1_000_000
 """Time after the end of all faults in which every viewer shows the same pose."""
-CLAIM_US = 1_000_000
+CLAIM_US = 400_000
 """Time in which a puppeteer gets a free limb once all faults are over."""
+STOP_US = 2_500_000
+"""Time in which a replica stops, with a job or a request that waits for its timeout."""
 
 Mutation = Callable[[], AbstractContextManager[object]]
 
@@ -100,7 +102,7 @@ class _Scenario:
 
     async def _run(self) -> None:
         random = self._random
-        self._world.start_replicas(random.randint(2, 3), 2, random.randint(1, 2))
+        self._world.start_replicas(random.randint(2, 3), 2, random.choice((0, 0, 1, 2)))
         for start in (self._operations.open_session, self._operations.open_session):
             self._operations.start(start)
         await self._sleep(300_000)
@@ -177,7 +179,7 @@ class _Scenario:
         for replica in self._world.replicas:
             if replica.is_up:
                 replica.stop()
-        await self._sleep(3_000_000)
+        await self._sleep(STOP_US)
         left = [task.get_name() for replica in self._world.replicas for task in replica.node.tasks]
         if left:
             raise Violation(f"tasks are left after the end of their process: {sorted(left)}")

@@ -5,17 +5,17 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import AbstractContextManager
-from typing import Any
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from unittest.mock import patch
 
 import pytest
 
-from bunraku.marionette.ownership import LimbGrant, Ownership
 from bunraku.messaging.key_value import MemoryKeyValueStore
+from bunraku.messaging.replica_registry import ReplicaRegistry
+from bunraku.session.session_registry import SessionRegistry
 from bunraku.session.stage import Stage
-from bunraku.stream.watched_session import WatchedSessions
+from bunraku.wire.messages import TimelineState
 from tests.conftest import REPOSITORY
 from tests.simulation.simulation import simulate
 from tests.simulation.storage import NodeObjects
@@ -50,36 +50,30 @@ def test_same_seed_gives_same_trace() -> None:
     assert replayed.stdout.splitlines()[:-1] == first[-1].trace
 
 
-def _grant_to_everyone(self: Ownership, limb: int, puppeteer: str, now: int) -> Any:
-    state = self._limbs[limb]
-    if state.holder is not None and state.holder != puppeteer:
-        state.release(now)
-    granted = _grant(self, limb, puppeteer, now)
-    assert isinstance(granted, LimbGrant)
-    return granted
+def _keep_timeline(self: Stage, state: TimelineState) -> TimelineState:
+    self._timelines.put(state)
+    return state
 
 
-_grant = Ownership._grant
+async def _do_nothing(*_: object) -> None: ...
 
 
-async def _lose_object(_: NodeObjects, __: str, ___: bytes) -> None:
-    """Store nothing, and report success."""
-
-
-async def _leave_task(_: Stage) -> None:
-    """Close nothing."""
+@contextmanager
+def _careless_takeover() -> Iterator[None]:
+    with (
+        patch.object(ReplicaRegistry, "is_alive", lambda *_: False),
+        patch.object(MemoryKeyValueStore, "_check_revision", lambda *_: None),
+    ):
+        yield
 
 
 MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
-    "writes ignore the expected revision": lambda: patch.object(
-        MemoryKeyValueStore, "_check_revision", lambda *_: None
-    ),
-    "a held limb is granted again": lambda: patch.object(Ownership, "_grant", _grant_to_everyone),
-    "state is not requested after a reconnection": lambda: patch.object(
-        WatchedSessions, "_resynchronise", lambda *_: None
-    ),
-    "an acknowledged object is not stored": lambda: patch.object(NodeObjects, "put", _lose_object),
-    "a closed stage leaves its task": lambda: patch.object(Stage, "close", _leave_task),
+    "sessions of live replicas are taken over": _careless_takeover,
+    "the record of an ended session stays": lambda: patch.object(SessionRegistry, "remove", _do_nothing),
+    "a grant is not sent": lambda: patch.object(Stage, "_send_grant", lambda *_: None),
+    "an edit is not published": lambda: patch.object(Stage, "_publish_timeline", _keep_timeline),
+    "an acknowledged object is not stored": lambda: patch.object(NodeObjects, "put", _do_nothing),
+    "a closed stage leaves its task": lambda: patch.object(Stage, "close", _do_nothing),
 }
 
 

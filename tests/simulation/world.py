@@ -141,9 +141,13 @@ def _log_records(world: World) -> Iterator[None]:
     logger.addHandler(handler)
     logger.setLevel(logging.WARNING)
     logger.propagate = False
+    # a process that is killed cannot roll back its transactions
+    pool, pool_level = logging.getLogger("sqlalchemy.pool"), logging.getLogger("sqlalchemy.pool").level
+    pool.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
+        pool.setLevel(pool_level)
         logger.removeHandler(handler)
         logger.setLevel(level)
         logger.propagate = propagates
