@@ -66,7 +66,8 @@ class Invariants:
     def _check_owners(self) -> None:
         owners: dict[str, list[SessionReplica]] = {}
         for replica in self._world.sessions:
-            if replica.node.is_alive:
+            # a server that stops waits for its requests first, which is not simulated
+            if replica.is_up:
                 for stage in replica.sessions.stages:
                     if not self._faults.was_cut_off(replica):
                         owners.setdefault(stage.id, []).append(replica)

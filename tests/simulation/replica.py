@@ -28,6 +28,9 @@ from tests.simulation.link import LinkQuality
 from tests.simulation.node import ClockError, Node
 from tests.simulation.storage import Databases, Disk
 
+LAST_TASK_S = 3.0
+"""Time in which the tasks of a stopped replica end: a request may wait for its timeout."""
+
 T = TypeVar("T")
 _SETTINGS = Settings()
 _METRICS = Metrics()
@@ -79,6 +82,8 @@ class Replica:
             self.node.clock,
         )
         self.is_stopping = False
+        self.left_tasks: list[str] = []
+        """Tasks that were running at the end of a regular stop."""
         self.node.call(self._start_service)
 
     @property
@@ -101,7 +106,11 @@ class Replica:
         await self.context.catalogue.close()
         await self.bus.close()
         # what was sent arrives before the connection ends
-        self.cluster.loop.call_later(0.05, self.kill)
+        self.cluster.loop.call_later(LAST_TASK_S, self._end)
+
+    def _end(self) -> None:
+        self.left_tasks = sorted(task.get_name() for task in self.node.tasks)
+        self.kill()
 
     def _start_service(self) -> None:
         raise NotImplementedError

@@ -28,7 +28,7 @@ CONVERGENCE_US = 1_000_000
 """Time after the end of all faults in which every viewer shows the same pose."""
 CLAIM_US = 400_000
 """Time in which a puppeteer gets a free limb once all faults are over."""
-STOP_US = 2_500_000
+STOP_US = 4_500_000
 """Time in which a replica stops, with a job or a request that waits for its timeout."""
 
 Mutation = Callable[[], AbstractContextManager[object]]
@@ -180,9 +180,9 @@ class _Scenario:
             if replica.is_up:
                 replica.stop()
         await self._sleep(STOP_US)
-        left = [task.get_name() for replica in self._world.replicas for task in replica.node.tasks]
+        left = [name for replica in self._world.replicas for name in replica.left_tasks]
         if left:
-            raise Violation(f"tasks are left after the end of their process: {sorted(left)}")
+            raise Violation(f"tasks are left at the end of their process: {left}")
 
     async def _sleep(self, duration_us: int) -> None:
         await asyncio.sleep(duration_us * 1e-6)
