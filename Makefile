@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/v1 services/web/vite.config.ts services/web/vite.embed.config.ts services/web/vite.reference.config.ts proto/prior.json proto/constants.json -type f 2>/dev/null)
 
-.PHONY: package pictures test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
+.PHONY: simulate package pictures test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    install everything, start the server and open the demo   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -75,9 +75,14 @@ lint: .setup/python
 test-python: setup
 	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile
 
-# a million steps of the merge against its model, about fifteen minutes
+# a million steps of the merge against its model, about fifteen minutes, and 10,000 simulations, about an hour
 test-nightly: setup
 	BUNRAKU_MERGE_STEPS=1000000 $(BIN)/pytest --timeout=7200 tests/marionette/test_merge_model.py
+	BUNRAKU_SIMULATION_SEEDS=10000 $(BIN)/pytest --numprocesses $$(getconf _NPROCESSORS_ONLN) tests/simulation
+
+# replay one simulation and print its trace (SEED=7)
+simulate: .setup/python
+	$(BIN)/python -m tests.simulation --seed $(or $(SEED),0)
 
 test-web: .setup/page
 	cd services/web && npm run --silent check && npm test --silent

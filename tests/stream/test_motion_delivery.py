@@ -15,8 +15,8 @@ from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.stream.flow_control import FlowControl, LinkState, PrefetchState
-from bunraku.stream.motion_delivery import MAX_IDLE_BLOCK_S, MotionDelivery
-from bunraku.stream.track_selection import TRACK_TYPES
+from bunraku.stream.motion_delivery import MAX_IDLE_BLOCK_S, MotionDelivery, MotionFeed
+from bunraku.stream.track_selection import TRACK_TYPES, ViewerOptions
 from bunraku.websocket.frame import frame_payload
 from bunraku.wire.messages import Choice, Data, Description, Report
 from bunraku.wire.messages import unpack as unpack_message
@@ -289,3 +289,18 @@ def test_idle_upgrades_stop_while_overlays_share_link(pair: StoredMotion) -> Non
     assert delivery.choice == (0, "hands")
     assert {packet[1] & 15 for packet in packets if packet[0] == Data.TYPE} == {0}
     assert delivery.next_packet(state, 2_000_000, flow, 0) is not None
+
+
+def test_timeline_of_an_earlier_epoch_changes_nothing(motion: StoredMotion, pair: StoredMotion) -> None:
+    feed = MotionFeed(ViewerOptions(), lambda: 0)
+    state = timeline.start("m", motion.first_track.duration_us, 0)
+    newer = timeline.edit(timeline.edit(state, 1, playing=True), 2, playing=True)
+    feed.set_timeline(newer, motion)
+    delivery, announcement = feed.delivery, feed.take_announcement(is_high_rtt=False)
+    assert announcement
+    # two replicas that both believe to own a session may publish the same epoch with different motions
+    for epoch_before in (state, timeline.change_motion(state, 3, pair.id, 1_000_000)):
+        feed.set_timeline(timeline.edit(epoch_before, 4), pair)
+        assert feed.delivery is delivery
+        assert feed.state is newer
+        assert feed.take_announcement(is_high_rtt=False) == []

@@ -271,3 +271,15 @@ async def test_unconstrained_link_is_unchecked_until_congested(
         simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
     assert (steady, simulation.viewer.accepts_direct_writes) == (False, True)
     simulation.viewer.on_close()
+
+
+async def test_block_due_in_quiet_period_waits_for_its_end(motion: StoredMotion) -> None:
+    simulation = ConstrainedViewer(motion)
+    viewer = simulation.viewer
+    viewer._feed.next_block_at = simulation.at - 2_000
+    viewer._quiet_period.ends_at = simulation.at + 100_000
+    viewer.tick()
+    assert viewer._timer is not None
+    # a tick that is due at once would be followed by another one until the end of the quiet period
+    assert viewer._next_tick() > simulation.at
+    viewer.on_close()

@@ -10,6 +10,7 @@ from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.messaging.bus import MemoryBus, NoResponse
 from bunraku.playout import timeline
+from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.clock import clock
 from bunraku.storage.motion_store import MotionStore
 from bunraku.stream import watched_session
@@ -154,6 +155,39 @@ async def test_state_is_requested_again_after_bus_reconnects(
     assert presence in transport.messages
     assert [m.limbs.keys() for m in transport.messages if isinstance(m, Overlay)] == [{2}, set()]
     viewer.on_close()
+
+
+async def test_state_is_requested_until_the_owner_answers(
+    motion_store: MotionStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watched_session, "RESYNCHRONISATION_RETRY_S", 0.0)
+    bus = MemoryBus()
+    callbacks: list[Callable[[], None]] = []
+    monkeypatch.setattr(bus, "on_reconnect", callbacks.append)
+    state, outages = [STATE.pack(), PRESENCE.pack(), None], 0
+
+    async def answer(_: bytes) -> bytes:
+        nonlocal outages
+        if outages:
+            outages -= 1
+            raise BackendUnavailable("the bus", "the owner is cut off")
+        packed: bytes = msgpack.packb(state)
+        return packed
+
+    bus.serve("session.s.state", answer)
+    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    viewer, transport = await join_viewer(watched)
+    await asyncio.gather(*watched._resync_tasks)
+    edited = timeline.edit(STATE, 2_000, playing=False)
+    state[0], outages = edited.pack(), 3
+    callbacks[0]()
+    await asyncio.gather(*watched._resync_tasks)
+    assert edited in transport.messages
+    # nothing is requested for a session that nobody watches any more
+    outages = 1_000_000
+    callbacks[0]()
+    viewer.on_close()
+    await asyncio.gather(*watched._resync_tasks)
 
 
 async def test_viewer_count_is_published_after_session_takeover(motion_store: MotionStore) -> None:

@@ -263,8 +263,10 @@ class MotionFeed:
         return self.delivery is not None and self.delivery.has_unsent_choice
 
     def set_timeline(self, state: TimelineState, motion: StoredMotion) -> None:
-        """Switch to a new timeline and its motion."""
+        """Switch to a new timeline and its motion; one of an epoch that is not newer changes nothing."""
         self._timeline_history.put(state)
+        if self._timeline_history.newest is not state:
+            return
         if self.delivery is None or self.delivery.motion is not motion:
             self.delivery = MotionDelivery(motion, self._track_types, self._pinned_level)
 

@@ -264,10 +264,11 @@ class ViewerConnection:
     def _send_constrained(self, now: int) -> None:
         """Send priority frames, then the rest while the link has capacity, and set the timer for what remains."""
         connection, flow, feed = self.connection, self._flow, self._feed
+        # while the timer runs, a block that is due needs no tick
+        feed.next_block_at = None
         if now < self._quiet_period.ends_at:
             self._set_timer(self._quiet_period.ends_at - now)
             return
-        feed.next_block_at = None
         # each Pong is a separate packet, as the Ping was, so that both directions take equally long
         for pong in self._queue.take_pongs():
             self._write(pong)

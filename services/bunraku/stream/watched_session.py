@@ -32,6 +32,8 @@ that join within a second would otherwise cause a million messages."""
 VIEWER_COUNT_REFRESH_S = 5.0
 """Interval at which an unchanged viewer count is published again, seconds: the stage forgets replicas that are silent
 for three intervals, as they have died."""
+RESYNCHRONISATION_RETRY_S = 1.0
+"""Interval at which the state of a session is requested again until its owner answers, seconds."""
 
 _log = logging.getLogger(__name__)
 
@@ -282,10 +284,14 @@ class WatchedSessions:
 
     def _resynchronise(self, *sessions: WatchedSession) -> None:
         async def resynchronise_all() -> None:
-            for session in sessions:
-                # a session between two owners announces itself when it continues
-                with contextlib.suppress(NoResponse, BackendUnavailable):
-                    await session.resynchronise()
+            stale = list(sessions)
+            while stale := [session for session in stale if session in self._sessions.values()]:
+                for session in tuple(stale):
+                    with contextlib.suppress(NoResponse, BackendUnavailable):
+                        await session.resynchronise()
+                        stale.remove(session)
+                # the owner may be unavailable now, and go on later without announcing itself
+                await asyncio.sleep(RESYNCHRONISATION_RETRY_S if stale else 0)
 
         task = asyncio.create_task(resynchronise_all(), name="resynchronise sessions")
         self._resync_tasks.add(task)

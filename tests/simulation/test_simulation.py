@@ -1,0 +1,85 @@
+"""Random simulations of the whole system, each from a seed; `tests/simulation/__main__.py` replays one."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from unittest.mock import patch
+
+import pytest
+
+from bunraku.messaging.key_value import MemoryKeyValueStore
+from bunraku.messaging.replica_registry import ReplicaRegistry
+from bunraku.session.session_registry import SessionRegistry
+from bunraku.session.stage import Stage
+from bunraku.wire.messages import TimelineState
+from tests.conftest import REPOSITORY
+from tests.simulation.simulation import simulate
+from tests.simulation.storage import NodeObjects
+
+SEEDS = int(os.environ.get("BUNRAKU_SIMULATION_SEEDS", "200"))
+"""Number of seeds; `make test-nightly` sets more."""
+SEEDS_PER_TEST = 10
+TRACED_SEEDS = range(3)
+MAX_SEEDS_PER_FAULT = 200
+"""Number of seeds within which a deliberate fault must be found."""
+
+
+@pytest.mark.parametrize("first", range(0, SEEDS, SEEDS_PER_TEST))
+def test_invariants_hold(first: int) -> None:
+    outcomes = [simulate(seed) for seed in range(first, min(first + SEEDS_PER_TEST, SEEDS))]
+    found = [
+        f"seed {outcome.seed}: {outcome.violation}\n    replay: python -m tests.simulation --seed {outcome.seed}"
+        for outcome in outcomes
+        if outcome.violation is not None
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_same_seed_gives_same_trace() -> None:
+    first, second = ([simulate(seed) for seed in TRACED_SEEDS] for _ in range(2))
+    assert first == second
+    command = [sys.executable, "-m", "tests.simulation", "--seed", str(TRACED_SEEDS[-1])]
+    environment = {**os.environ, "PYTHONHASHSEED": "1", "PYTHONPATH": f"{REPOSITORY / 'services'}"}
+    replayed = subprocess.run(
+        command, cwd=REPOSITORY, env=environment, capture_output=True, text=True, timeout=100, check=False
+    )
+    assert replayed.stdout.splitlines()[:-1] == first[-1].trace
+
+
+def _keep_timeline(self: Stage, state: TimelineState) -> TimelineState:
+    self._timelines.put(state)
+    return state
+
+
+async def _do_nothing(*_: object) -> None: ...
+
+
+@contextmanager
+def _careless_takeover() -> Iterator[None]:
+    with (
+        patch.object(ReplicaRegistry, "is_alive", lambda *_: False),
+        patch.object(MemoryKeyValueStore, "_check_revision", lambda *_: None),
+    ):
+        yield
+
+
+MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
+    "sessions of live replicas are taken over": _careless_takeover,
+    "the record of an ended session stays": lambda: patch.object(SessionRegistry, "remove", _do_nothing),
+    "a grant is not sent": lambda: patch.object(Stage, "_send_grant", lambda *_: None),
+    "an edit is not published": lambda: patch.object(Stage, "_publish_timeline", _keep_timeline),
+    "an acknowledged object is not stored": lambda: patch.object(NodeObjects, "put", _do_nothing),
+    "a closed stage leaves its task": lambda: patch.object(Stage, "close", _do_nothing),
+}
+
+
+@pytest.mark.parametrize("name", MUTATIONS)
+def test_deliberate_fault_is_found(name: str) -> None:
+    for seed in range(MAX_SEEDS_PER_FAULT):
+        if simulate(seed, MUTATIONS[name]).violation is not None and simulate(seed).violation is None:
+            return
+    pytest.fail(f"none of {MAX_SEEDS_PER_FAULT} seeds finds that {name}")
