@@ -30,7 +30,8 @@ class SimulatedSender:
     def probe(self, _: int) -> bytes:
         return b""
 
-    def receive_probe_echo(self, payload: bytes) -> bool: ...
+    def receive_probe_echo(self, _: bytes) -> bool:
+        return False
 
     def set_corked(self, corked: bool) -> None:
         assert not corked

@@ -53,7 +53,8 @@ class ConstrainedTransport(FakeTransport):
     def probe(self, _: int) -> bytes:
         return b""
 
-    def receive_probe_echo(self, payload: bytes) -> bool: ...
+    def receive_probe_echo(self, _: bytes) -> bool:
+        return False
 
     def set_corked(self, corked: bool) -> None:
         self.cork_calls.append(corked)

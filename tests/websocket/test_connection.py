@@ -19,7 +19,7 @@ class FakeTransport(asyncio.Transport):
         super().__init__()
         self.written = b""
         self.is_closed = False
-        self.is_reading = True
+        self.reads = True
         self.protocol: Any = None
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
@@ -30,10 +30,10 @@ class FakeTransport(asyncio.Transport):
         return protocol
 
     def pause_reading(self) -> None:
-        self.is_reading = False
+        self.reads = False
 
     def resume_reading(self) -> None:
-        self.is_reading = True
+        self.reads = True
 
     def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None: ...
 
@@ -133,7 +133,7 @@ async def test_flood_is_closed_with_the_reason_and_not_parsed_further(name: str)
     assert b"Too many messages" in transport.written
     # from now on input is discarded, and read slowly
     assert transport.protocol is not connection
-    assert not transport.is_reading
+    assert not transport.reads
     transport.protocol.data_received(first * 1_000)
     assert len(listener.events) <= limit.burst + 1
     transport.protocol.connection_lost(None)
@@ -153,13 +153,13 @@ async def test_other_connections_are_served_between_the_frames_of_one() -> None:
     connection.data_received(client_frame(Opcode.BINARY, b"m") * 100 + b"\x82")
     turns = [len(listener.events)]
     while len(listener.events) < 100:
-        assert not transport.is_reading
+        assert not transport.reads
         await asyncio.sleep(0)
         turns.append(len(listener.events))
     assert max(after - before for before, after in pairwise(turns)) == FRAMES_PER_TURN
     assert turns[0] == FRAMES_PER_TURN
     await asyncio.sleep(0)
-    assert transport.is_reading
+    assert transport.reads
     # the frame that has begun continues
     connection.data_received(b"\x81" + bytes(4) + b"n")
     assert listener.events[-1] == "message n"

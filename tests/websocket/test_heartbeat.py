@@ -10,7 +10,8 @@ RECEIVED_AT = 10**9
 class NullListener:
     def on_message(self, message: bytes) -> None: ...
 
-    def on_pong(self, payload: bytes) -> bool: ...
+    def on_pong(self, _: bytes) -> bool:
+        return False
 
     def on_pause(self) -> None: ...
 

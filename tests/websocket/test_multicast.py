@@ -26,7 +26,8 @@ class SilentListener:
 
     def on_message(self, message: bytes) -> None: ...
 
-    def on_pong(self, payload: bytes) -> bool: ...
+    def on_pong(self, _: bytes) -> bool:
+        return False
 
     def on_pause(self) -> None: ...
 
