@@ -44,7 +44,11 @@ async def store_motion(
         if await context.catalogue.get_motion(motion_id) is None:
             await context.motion_store.remove(motion_id)
         raise _quota_problem(error) from None
-    if not is_new:
+    if is_new:
+        if (await context.motion_store.object_sizes([motion_id]))[0] is None:
+            # a removal of the same motion at the same time has taken the object, and then the row that was there
+            await context.motion_store.put(motion_id, result.packed)
+    else:
         entry = await context.catalogue.get_motion(motion_id) or entry
     return StoreOutcome(entry, is_new)
 
