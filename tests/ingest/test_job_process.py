@@ -9,6 +9,7 @@ import pytest
 from bunraku.ingest import job_process
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.runtime import worker_process
 from tests.servers import make_bvh_clip
 
 
@@ -21,7 +22,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
     assert result.description["frames"] == 15
     assert shares == sorted(set(shares))
     assert (shares[0], shares[-1]) == (0.0, 1.0)
-    assert 5 < len(shares) <= job_process.MAX_PROGRESS_REPORTS + 1
+    assert 5 < len(shares) <= worker_process.MAX_PROGRESS_REPORTS + 1
 
 
 async def test_crashed_job_is_a_rejection(tmp_path: Path) -> None:
