@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import h11
 
+from bunraku.http.request_body import ChunkLimit
+
 MAX_HEAD_BYTES = 16 << 10
 """Maximum size of the request line and header fields."""
 MAX_TARGET_BYTES = 8_000
@@ -15,7 +17,7 @@ MAX_FIELDS = 100
 
 
 class BoundedConnection(h11.Connection):
-    """Server side of an HTTP/1.1 connection that rejects heads which are too large or ambiguous.
+    """Server side of an HTTP/1.1 connection that rejects heads which are too large or ambiguous, and tiny chunks.
 
     `next_event` raises `h11.RemoteProtocolError` with the status of the response, and `error` keeps it.
     """
@@ -23,11 +25,15 @@ class BoundedConnection(h11.Connection):
     def __init__(self) -> None:
         super().__init__(h11.SERVER, MAX_HEAD_BYTES)
         self.error: h11.RemoteProtocolError | None = None
+        self._chunk_limit = ChunkLimit()
 
     def next_event(self) -> h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]:
         try:
             event = super().next_event()
+            if isinstance(event, h11.Data) and not self._chunk_limit.add_chunk(len(event.data)):
+                _reject("the body has too many small chunks", 400)
             if isinstance(event, h11.Request):
+                self._chunk_limit = ChunkLimit()
                 check_request_head(event)
                 if _is_websocket_upgrade(event) and self.trailing_data[0]:
                     _reject("data follows a WebSocket handshake before its response", 400)
