@@ -108,13 +108,13 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
     from bunraku.ingest.jobs.motion import encode_file
     from bunraku.ingest.jobs.performers import combine_performers
     from bunraku.ingest.jobs.recording import encode_recording
-    from bunraku.ingest.jobs.scene import add_scene
+    from bunraku.ingest.jobs.scene import add_scene_of_body
 
     functions: dict[JobKind, Callable[..., JobResult | JobRejection]] = {
         JobKind.MOTION: encode_file,
         JobKind.RECORDING: encode_recording,
         JobKind.AUDIO: add_audio,
-        JobKind.SCENE: add_scene,
+        JobKind.SCENE: add_scene_of_body,
         JobKind.PERFORMERS: combine_performers,
     }
     return functions[kind](*arguments)

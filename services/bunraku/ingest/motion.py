@@ -44,7 +44,7 @@ class MotionOperation:
         known = await self._context.catalogue.get_motion(motion_id)
         if known is not None and await self._context.motion_store.get(motion_id) is not None:
             return StoreOutcome(known, False)
-        async with self._worker_slots:
+        async with self._worker_slots.hold(source.subject):
             progress.advance_to("reading")
             outcome = await self._worker_slots.run_job(
                 JobKind.MOTION,
