@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi import Depends, FastAPI
 from starlette.requests import ClientDisconnect, Request
+from starlette.responses import StreamingResponse
 
 from bunraku.http.access_control import ACCESS_SCOPE_KEY, Access, Role
 from bunraku.http.large_body import (
@@ -119,3 +121,35 @@ async def test_large_response_is_sent_in_pieces() -> None:
     pieces = [bytes(piece) async for piece in response.body_iterator]  # type: ignore[arg-type]
     assert b"".join(pieces) == data
     assert max(map(len, pieces)) == RESPONSE_PIECE_BYTES
+
+
+async def test_slot_and_file_are_kept_until_the_response_is_sent() -> None:
+    bodies, app = LargeBodies("batches", max_inline_bytes=INLINE_BYTES), FastAPI()
+
+    @app.post("/echo")
+    async def echo(body: BodySource = Depends(bodies.receive)) -> StreamingResponse:
+        return large_response(await asyncio.to_thread(read_body, body), "text/plain")
+
+    data, sent, may_continue = b"x" * 2 * RESPONSE_PIECE_BYTES, list[bytes](), asyncio.Event()
+    first_piece = asyncio.Event()
+
+    async def send(message: Any) -> None:
+        if body := message.get("body"):
+            sent.append(body)
+            first_piece.set()
+            await may_continue.wait()
+
+    request = make_request(data)
+
+    async def receive_and_stay() -> Any:
+        message = await request.receive()
+        return message if message["type"] == "http.request" else await asyncio.Future()
+
+    scope = request.scope | {"method": "POST", "path": "/echo", "raw_path": b"/echo", "query_string": b""}
+    responding = asyncio.create_task(app(scope, receive_and_stay, send))
+    await first_piece.wait()
+    assert len(body_folders()) == 1
+    may_continue.set()
+    await responding
+    assert b"".join(sent) == data
+    assert body_folders() == []

@@ -11,7 +11,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.job_queue import JobDetails, UploadJob
-from bunraku.ingest.motion_id import derive_digest, derive_motion_id
+from bunraku.ingest.motion_id import derive_digest, derive_job_id
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import JobRejection, JobResult
@@ -24,7 +24,7 @@ from bunraku.storage.record import CatalogueEntry
 def create_audio_job(motion_id: str, digest: bytes, filename: str, subject: str) -> UploadJob:
     """Describe the job that adds the sound file with this SHA-256 digest to a motion."""
     details = {"kind": "audio", "motion": motion_id, "digest": digest.hex(), "filename": filename, "subject": subject}
-    return UploadJob(f"{motion_id}-{derive_motion_id(digest)}", details)
+    return UploadJob(derive_job_id(motion_id, subject, digest), details)
 
 
 class AudioOperation:

@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.job_queue import JobDetails, UploadJob
-from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.ingest.motion_id import derive_job_id, derive_motion_id
 from bunraku.ingest.persistence import StoreOutcome, store_motion
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import require_result
@@ -20,7 +20,8 @@ from bunraku.runtime.context import ServiceContext
 def create_motion_job(digest: bytes, filename: str, subject: str) -> UploadJob:
     """Describe the job for a motion file with this SHA-256 digest."""
     motion_id = derive_motion_id(digest)
-    return UploadJob(motion_id, {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject})
+    job_id = derive_job_id(motion_id, subject)
+    return UploadJob(job_id, {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject})
 
 
 class MotionOperation:
