@@ -145,7 +145,7 @@ async def test_slot_and_file_are_kept_until_the_response_is_sent() -> None:
         message = await request.receive()
         return message if message["type"] == "http.request" else await asyncio.Future()
 
-    scope = request.scope | {"method": "POST", "path": "/echo", "raw_path": b"/echo", "query_string": b""}
+    scope = {**request.scope, "method": "POST", "path": "/echo", "raw_path": b"/echo", "query_string": b""}
     responding = asyncio.create_task(app(scope, receive_and_stay, send))
     await first_piece.wait()
     assert len(body_folders()) == 1
