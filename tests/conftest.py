@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import functools
+import inspect
 import os
 import tempfile
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +28,32 @@ DEFAULT_TIMEOUT_CONFIG.read = 60.0
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
+COROUTINE_TIMEOUT_S = 300.0
+"""Time after which a test that is a coroutine fails; it only ends tests that hang, also on a busy machine."""
 SUMMARY_LINES = pytest.StashKey[list[str]]()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Let a coroutine that hangs fail by itself, so that the report names it and other tests continue."""
+    for item in items:
+        if isinstance(item, pytest.Function) and inspect.iscoroutinefunction(item.obj):
+            item.obj = fail_after(item.obj, COROUTINE_TIMEOUT_S)
+
+
+def fail_after(test: Callable[..., Awaitable[None]], timeout_s: float) -> Callable[..., Awaitable[None]]:
+    """Return the coroutine function `test` with a time limit."""
+
+    @functools.wraps(test)
+    async def limited(*arguments: Any, **options: Any) -> None:
+        try:
+            async with asyncio.timeout(timeout_s) as limit:
+                await test(*arguments, **options)
+        except TimeoutError:
+            if limit.expired():
+                pytest.fail(f"the test did not end within {timeout_s:g} s")
+            raise
+
+    return limited
 
 
 @pytest.fixture

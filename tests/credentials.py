@@ -23,9 +23,11 @@ def make_token(
     session: str | None = None,
     motion: str | None = None,
 ) -> str:
-    """Return a valid token."""
+    """Return a token that is valid if `lifetime_s`, in seconds from now, is positive."""
     now = int(time.time())
-    return TokenSigner(SECRET).mint(Access(role, subject, session, motion, now + lifetime_s), now)
+    # a token must be valid when it is signed
+    issued = min(now, now + lifetime_s - 1)
+    return TokenSigner(SECRET).mint(Access(role, subject, session, motion, now + lifetime_s), issued)
 
 
 def make_claims(**overrides: Any) -> dict[str, Any]:
@@ -38,6 +40,11 @@ def make_claims(**overrides: Any) -> dict[str, Any]:
 def sign_token(secret: str = SECRET, algorithm: str = "HS256", **overrides: Any) -> str:
     """Return a signed token with overridden claims."""
     return jwt.encode(make_claims(**overrides), secret, algorithm)
+
+
+def sign_nested_token() -> str:
+    """Return a signed token whose payload is a token (RFC 7519, section 2, Nested JWT)."""
+    return jwt.api_jws.encode(sign_token().encode(), SECRET, "HS256", headers={"cty": "JWT"})
 
 
 def make_unsigned_token() -> str:

@@ -185,8 +185,11 @@ def nats_url_of(server: ServerProcess) -> str:
 
 
 @contextmanager
-def run_postgres() -> Iterator[ServerProcess]:
-    """Run a PostgreSQL server without a password, with the user `postgres`. Skip the test if none is installed."""
+def run_postgres(*, certificate: Path | None = None, key: Path | None = None) -> Iterator[ServerProcess]:
+    """Run a PostgreSQL server without a password, with the user `postgres`. Skip the test if none is installed.
+
+    With a certificate and its key, the server requires TLS.
+    """
     debian = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
     initdb, program = find_program("initdb", *debian), find_program("postgres", *debian)
     # it refuses to run as root, and another user cannot access the folder of the tests
@@ -210,6 +213,14 @@ def run_postgres() -> Iterator[ServerProcess]:
             "fsync": "off",
             "shared_buffers": "16MB",
         }
+        if certificate is not None and key is not None:
+            for source in (certificate, key):
+                shutil.copy(source, folder)
+                shutil.chown(folder / source.name, user or os.geteuid())
+            options |= {"ssl": "on", "ssl_cert_file": f"{folder / certificate.name}"}
+            options |= {"ssl_key_file": f"{folder / key.name}", "hba_file": f"{folder / 'pg_hba.conf'}"}
+            (folder / "pg_hba.conf").write_text("hostssl all all all trust\n")
+            (folder / "pg_hba.conf").chmod(0o644)
         arguments = (word for option, value in options.items() for word in ("-c", f"{option}={value}"))
         command = [program, "-D", str(folder / "data"), *arguments]
         ready = [find_program("pg_isready", *debian), "-q", "-h", "127.0.0.1", "-p", str(port)]

@@ -1,8 +1,14 @@
 from __future__ import annotations
 
 import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
+import pytest
 from typer.testing import CliRunner
 
 from bunraku import __version__
@@ -114,3 +120,49 @@ def test_bench_viewers_prints_statistics(server: str, clip_file: Path) -> None:
     rejected = RUN.invoke(app, ["bench", "viewers", "--n", "2", "--url", "ws://127.0.0.1:9/v1/sessions/s/stream"])
     assert rejected.exit_code == 1
     assert "Traceback" not in rejected.output
+
+
+@contextmanager
+def run_hostile_server(status: int, body: dict[str, Any]) -> Iterator[str]:
+    """Run a server that answers every request with a JSON body, and yield its address."""
+
+    class Handler(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            data = json.dumps(body).encode()
+            self.send_response(status)
+            self.send_header("Content-Length", str(len(data)))
+            self.end_headers()
+            self.wfile.write(data)
+
+        def log_message(self, *_: object) -> None:
+            """Log nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+HOSTILE = "\x1b]0;owned\x07\x1b[2J\u202e\x9b\x00\n[/red][link=http://evil.example]"
+
+
+@pytest.mark.parametrize("command", [["list"], ["share"], ["watch", "m1"]])
+@pytest.mark.parametrize("status", [200, 403])
+@pytest.mark.parametrize("as_json", [False, True])
+def test_hostile_server_does_not_control_the_terminal(command: list[str], status: int, as_json: bool) -> None:
+    motion = {"id": HOSTILE, "name": HOSTILE, "duration": 1.0, "fps": 60, "rates": [], "tracks": [HOSTILE]}
+    share = {"session": HOSTILE, "motion": None, "expires": HOSTILE}
+    body = {"items": [{**motion, **share}], "next": None, "title": HOSTILE, "detail": HOSTILE, "hint": HOSTILE}
+    with run_hostile_server(status, body) as url:
+        result = RUN.invoke(app, [*command, "--server", url, *(["--json"] if as_json else [])])
+    assert result.exception is None or isinstance(result.exception, SystemExit)
+    assert not set(result.output) & set(HOSTILE) & {"\x1b", "\x07", "\x9b", "\x00", "\u202e"}
+    if status == 200 and command[0] != "watch":
+        assert (r"\u001b]0;owned" in result.output) is True
+        if as_json:
+            shown = json.loads(result.stdout)
+            assert (shown if command == ["list"] else shown["items"])[0]["id"] == HOSTILE

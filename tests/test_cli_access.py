@@ -59,6 +59,7 @@ def test_token_fails_without_valid_secret_and_never_prints_it(tmp_path: Path, mo
         (SECRET, ["--role", "owner"]),
         (SECRET, ["--role", "admin", "--session", "s"]),
         (SECRET, ["--role", "view", "--session", "a b"]),
+        (SECRET, ["--role", "view", "--motion", "m" * 65]),
     ):
         monkeypatch.setenv("BUNRAKU_SECRET", secret)
         rejected = RUN.invoke(app, ["token", "--data", str(tmp_path), *options])
@@ -66,6 +67,26 @@ def test_token_fails_without_valid_secret_and_never_prints_it(tmp_path: Path, mo
         assert "Traceback" not in rejected.output
         assert not secret or secret not in rejected.output
         assert rejected.output.strip()
+
+
+def test_token_is_one_that_the_server_accepts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BUNRAKU_SECRET", SECRET)
+    longest = RUN.invoke(app, ["token", "--hours", "168", "--name", "\x1b[31mai\u202eko"])
+    access = TokenSigner(SECRET).verify(longest.stdout.strip(), time.time())
+    assert access.subject == "aiko"
+    assert RUN.invoke(app, ["token", "--hours", "168.1"]).exit_code == 2
+
+
+def test_share_says_that_the_link_ends_with_the_token(
+    protected: tuple[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    url, session = protected
+    monkeypatch.setenv("BUNRAKU_TOKEN", make_token(Role.CONTROL, "host", lifetime_s=3_600))
+    created = RUN.invoke(app, ["share", session, "--server", url])
+    assert created.stdout.startswith(url)
+    assert "ends with your token" in created.stderr
+    monkeypatch.setenv("BUNRAKU_TOKEN", make_token(Role.ADMIN, "host", lifetime_s=3_600))
+    assert "ends with" not in RUN.invoke(app, ["share", session, "--server", url]).stderr
 
 
 def test_share_creates_lists_and_revokes_links(protected: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 import resource
 from pathlib import Path
 
@@ -15,7 +16,6 @@ async def test_all_services_are_served_and_described(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         assert (await http.get("/v1/health")).json() == {"status": "ok", "version": __version__}
         described = (await http.get("/v1/openapi.json")).json()
-        assert (await http.get("/v1/docs")).status_code == 200
     routes = {(path, method) for path, methods in described["paths"].items() for method in methods}
     assert routes >= {
         ("/v1/motions", "post"),
@@ -30,6 +30,45 @@ async def test_all_services_are_served_and_described(server: str) -> None:
         ("/v1/solve", "post"),
         ("/v1/health", "get"),
     }
+
+
+async def test_reference_of_the_api_loads_only_files_of_this_server(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        page = await http.get("/v1/docs")
+        assert (page.status_code, page.headers["content-type"]) == (200, "text/html; charset=utf-8")
+        policy = dict(one.split(" ", 1) for one in page.headers["content-security-policy"].split("; "))
+        assert policy["default-src"] == policy["frame-ancestors"] == policy["base-uri"] == "'none'"
+        assert policy["script-src"] == policy["style-src"] == policy["connect-src"] == "'self'"
+        assert page.headers["x-frame-options"] == "DENY"
+        assert page.headers["x-content-type-options"] == "nosniff"
+        # neither inline scripts and styles nor event handlers
+        assert re.findall(r"<script(?![^>]*src=)|<style|style=|\son\w+=", page.text) == []
+        files = re.findall(r'<(?:script|link)[^>]*(?:src|href)="(?!data:)([^"]+)"', page.text)
+        assert len(files) >= 2
+        for file in files:
+            address = page.url.join(file)
+            assert (address.host, address.port) == (page.url.host, page.url.port)
+            asset = await http.get(address)
+            assert asset.status_code == 200
+            assert "immutable" in asset.headers["cache-control"]
+            assert not re.findall(r"https?://(?!www\.w3\.org)", asset.text)
+
+
+@pytest.mark.parametrize("path", ["/docs", "/docs/", "/redoc", "/docs/oauth2-redirect", "/openapi.json", "/v1/docs/"])
+async def test_documentation_has_no_other_address(server: str, path: str) -> None:
+    async with httpx2.AsyncClient(base_url=server) as http:
+        assert (await http.get(path)).status_code == 404
+
+
+async def test_reference_says_how_to_build_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serve, "PAGE_FOLDER", tmp_path / "nowhere")
+    async with serve.compose_app(Settings(data=tmp_path / "data"), services=("stream",)) as app:
+        transport = httpx2.ASGITransport(app)
+        async with httpx2.AsyncClient(transport=transport, base_url="http://stage") as http:
+            answer = await http.get("/v1/docs")
+    assert answer.status_code == 503
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert "make setup" in answer.json()["hint"]
 
 
 async def test_page_process_describes_the_whole_api(tmp_path: Path, server: str) -> None:

@@ -3,8 +3,11 @@ from __future__ import annotations
 import json
 
 import pytest
+import typer
+from rich.table import Table
 
 from bunraku import terminal
+from bunraku.client.api import ServerProblem
 
 
 def test_print_plain_ignores_markup_and_width(capsys: pytest.CaptureFixture[str]) -> None:
@@ -20,3 +23,38 @@ def test_statistics_are_printed_as_table_or_json(capsys: pytest.CaptureFixture[s
     assert rows == [["first", "pose", "ms", "-"], ["gaps", "0"]]
     terminal.print_statistics(statistics, as_json=True)
     assert json.loads(capsys.readouterr().out) == statistics
+
+
+HOSTILE = "\x1b]0;owned\x07\x9b2J\u202ename\n[red]forged[/] :smile: \ud800"
+ESCAPED = r"\u001b]0;owned\u0007\u009b2J\u202ename\u000a[red]forged[/] :smile: \ud800"
+
+
+def test_hostile_text_is_printed_as_escapes_in_lines_tables_and_errors(capsys: pytest.CaptureFixture[str]) -> None:
+    table = Table("name [/]", box=None)
+    table.add_row(HOSTILE)
+    terminal.out.print(table, soft_wrap=True)
+    terminal.print_plain(HOSTILE)
+    terminal.print_statistics({"name": HOSTILE}, as_json=False)
+    terminal.err.print(str(ServerProblem(404, {"title": HOSTILE, "detail": "none"})), soft_wrap=True)
+    printed = capsys.readouterr()
+    # tables wrap
+    assert "".join(printed.out.split()).count("".join(ESCAPED.split())) == 3
+    assert printed.err == f"{ESCAPED}: none\n"
+    assert not {"\x1b", "\x07", "\x9b", "\u202e"} & set(printed.out + printed.err)
+
+
+def test_json_output_of_hostile_text_is_valid_and_equal(capsys: pytest.CaptureFixture[str]) -> None:
+    terminal.out.print_json(data={"name": HOSTILE, "items": ["人形 👍🏽"]})
+    printed = capsys.readouterr().out
+    assert json.loads(printed) == {"name": HOSTILE, "items": ["人形 👍🏽"]}
+    assert "人形 👍🏽" in printed
+    assert not {"\x1b", "\x07", "\x9b", "\u202e"} & set(printed)
+
+
+def test_failed_request_prints_the_error_escaped(capsys: pytest.CaptureFixture[str]) -> None:
+    async def fail() -> None:
+        raise ServerProblem(422, {"title": "Bad", "detail": HOSTILE})
+
+    with pytest.raises(typer.Exit):
+        terminal.run_request(fail, "http://127.0.0.1:1")
+    assert "\x1b" not in capsys.readouterr().err

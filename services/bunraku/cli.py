@@ -12,6 +12,7 @@ from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 import typer
+from rich.text import Text
 
 from bunraku import __version__
 from bunraku.cli_access import (
@@ -22,6 +23,7 @@ from bunraku.cli_access import (
     share,
     token,
 )
+from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
     DEFAULT_SERVER,
     JsonOption,
@@ -36,7 +38,12 @@ from bunraku.terminal import (
     run_request,
 )
 
-app = typer.Typer(help="Stream humanoid motion to browsers, and let viewers control the limbs.", no_args_is_help=True)
+app = typer.Typer(
+    help="Stream humanoid motion to browsers, and let viewers control the limbs.",
+    no_args_is_help=True,
+    # they may be tokens
+    pretty_exceptions_show_locals=False,
+)
 app.command()(token)
 app.command()(share)
 
@@ -71,7 +78,7 @@ def up(
     try:
         settings = Settings() if data is None else Settings(data=data)
     except ValueError as error:
-        err.print(describe_setting_error(error), markup=False)
+        err.print(describe_setting_error(error))
         raise typer.Exit(1) from None
     log.configure_logging(settings.logs, settings.log_level, "all" if service is None else ",".join(services))
     created_secret = ensure_secret(settings, host)
@@ -85,12 +92,13 @@ def up(
     url = f"http://{url_host}:{listening.getsockname()[1]}/"
 
     def print_address() -> None:
-        out.print(f"Bunraku {__version__} is at [link={url}]{url}[/link]", soft_wrap=True)
+        out.print(Text.assemble(f"Bunraku {__version__} is at ", (url, f"link {url}")), soft_wrap=True)
         out.print(f"Data is stored in {settings.data}. Press Ctrl-C to stop.", soft_wrap=True)
         is_protected = bool(settings.secret.get_secret_value()) and "page" in services
         link = make_operator_link(settings, url) if is_protected else url
         if is_protected and (created_secret or out.is_terminal):
-            print_plain(f"Clients need a link. Yours, valid for {DEFAULT_TOKEN_HOURS:g} hours:\n{link}")
+            print_plain(f"Clients need a link. Yours, valid for {DEFAULT_TOKEN_HOURS:g} hours:")
+            print_plain(link)
         elif is_protected:
             out.print(f"Clients need a link: create one with `bunraku token --server {url}`.", soft_wrap=True)
         if open_page:
@@ -106,7 +114,7 @@ def up(
 
             uvloop.run(serving)
     except MetricsListenError as error:
-        err.print(str(error), markup=False)
+        err.print(str(error))
         raise typer.Exit(1) from None
     out.print("Stopped.")
 
@@ -387,13 +395,13 @@ def _send_file(
             TextColumn("{task.fields[name]}", markup=False),
             BarColumn(),
             TaskProgressColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
         )
         with Progress(*columns, console=err, disable=quiet or not err.is_terminal, transient=True) as progress:
-            task = progress.add_task("sending", name=file.name, total=1)
+            task = progress.add_task("sending", name=escape_text(file.name), total=1)
 
             def on_progress(stage: str, share: float) -> None:
-                progress.update(task, description=stage, completed=share)
+                progress.update(task, description=escape_text(stage), completed=share)
 
             async with Client(server, token) as client:
                 return await send(client, lambda sent, size: on_progress("sending", sent / size), on_progress)

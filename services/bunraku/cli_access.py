@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -39,9 +40,10 @@ def token(
 ) -> None:
     """Create a token, signed with BUNRAKU_SECRET or with the secret in the server's data folder."""
     from bunraku.http.access_control import Access, Role
-    from bunraku.http.access_token import TokenSigner
+    from bunraku.http.access_token import MAX_SUBJECT_CHARACTERS, TokenSigner
     from bunraku.http.secret import load_secret
     from bunraku.http.timestamp import format_timestamp
+    from bunraku.runtime.display_text import clean_text
     from bunraku.runtime.settings import Settings
 
     try:
@@ -54,10 +56,11 @@ def token(
             )
             raise typer.Exit(1)
         now = time.time()
-        access = Access(Role.parse(role), name[:64] or "operator", session, motion, int(now + hours * 3600))
+        subject = clean_text(name, MAX_SUBJECT_CHARACTERS) or "operator"
+        access = Access(Role.parse(role), subject, session, motion, int(now + hours * 3600))
         signed = TokenSigner(secret).mint(access, now)
     except ValueError as error:
-        err.print(describe_setting_error(error), markup=False)
+        err.print(describe_setting_error(error))
         raise typer.Exit(1) from None
     link = f"{server.rstrip('/')}/{f'?session={session}' if session else ''}#token={signed}" if server else None
     if as_json:
@@ -80,7 +83,7 @@ def share(
     from bunraku.client.api import Client
 
     base, kind, resource_id = parse_resource_address(what) if what is not None else (None, None, "")
-    address = base or server
+    address, seconds = base or server, max(round(days * 86_400), 60)
 
     async def request() -> dict[str, Any]:
         async with Client(address, token) as client:
@@ -91,7 +94,7 @@ def share(
                 return {"items": await client.shares()}
             found_kind = kind or await find_resource_kind(client, resource_id)
             resource = {found_kind.removesuffix("s"): resource_id}
-            created = await client.share(**resource, seconds=max(round(days * 86_400), 60))
+            created = await client.share(**resource, seconds=seconds)
             return {**created, "link": f"{client.url}{created['link']}"}
 
     result = run_request(request, address)
@@ -102,6 +105,13 @@ def share(
             print_plain(f"{one['id']}  {one['session'] or one['motion']}  until {one['expires']}")
     else:
         print_plain(f"Revoked {revoke}" if revoke is not None else result["link"])
+        if "expires" in result and _lifetime_s(result) < seconds:
+            err.print(f"The link ends with your token, at {result['expires']}.")
+
+
+def _lifetime_s(share: dict[str, Any]) -> float:
+    created, expires = (datetime.fromisoformat(share[name]) for name in ("created", "expires"))
+    return (expires - created).total_seconds()
 
 
 def ensure_secret(settings: Settings, host: str) -> bool:
@@ -126,7 +136,7 @@ def ensure_secret(settings: Settings, host: str) -> bool:
     try:
         settings.secret = SecretStr(load_or_create_secret(settings.data))
     except (ValueError, OSError) as error:
-        err.print(str(error), markup=False)
+        err.print(str(error))
         raise typer.Exit(1) from None
     return True
 

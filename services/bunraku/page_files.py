@@ -1,13 +1,15 @@
-"""ASGI app that serves the built web page."""
+"""ASGI app that serves the built web page, and the reference page of the HTTP API."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from starlette.middleware.gzip import GZipMiddleware
-from starlette.responses import PlainTextResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Scope
+
+from bunraku.runtime.problem import ProblemError
 
 PAGE_HEADERS = {
     "Content-Security-Policy": "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; "
@@ -16,8 +18,17 @@ PAGE_HEADERS = {
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
 }
 """The page runs only files of this server, cannot be framed, and sends no referrer."""
+REFERENCE_FILE = Path("v1", "docs.html")
+"""Reference page of the HTTP API in the folder of the page."""
+REFERENCE_HEADERS = {
+    **PAGE_HEADERS,
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; "
+    "img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Cache-Control": "no-cache",
+}
 IMMUTABLE_PREFIXES = ("assets/", "embed/parts/")
 """Folders whose file names contain a hash of the content."""
 CROSS_ORIGIN_PREFIX = "embed/"
@@ -43,3 +54,16 @@ def create_page_app(folder: Path) -> ASGIApp:
     if not (folder / "index.html").is_file():
         return PlainTextResponse("The page is not built: run `make setup`. The API is at /v1/docs.\n", 503)
     return GZipMiddleware(PageFiles(directory=folder, html=True), minimum_size=1000)
+
+
+def reference_response(folder: Path) -> Response:
+    """Return the reference page of the HTTP API; raise `ProblemError` 503 if the page is not built."""
+    path = folder / REFERENCE_FILE
+    if not path.is_file():
+        raise ProblemError(
+            503,
+            "Page not built",
+            "the reference of the API is part of the page, which is not built",
+            hint="run `make setup`, or read /v1/openapi.json",
+        )
+    return FileResponse(path, headers=REFERENCE_HEADERS)

@@ -10,12 +10,14 @@ import sys
 import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterator, Mapping
 from contextlib import AsyncExitStack, asynccontextmanager, contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from signal import SIGINT, SIGTERM
 from typing import Any
 
 import uvicorn
-from fastapi import FastAPI
+from fastapi import FastAPI, Response
+from fastapi.responses import JSONResponse
 from starlette.routing import BaseRoute
 
 import bunraku.access.app
@@ -29,11 +31,13 @@ from bunraku.demo.bootstrap import open_demo_stage
 from bunraku.http.access_control import requires
 from bunraku.http.access_log import AccessLogMiddleware
 from bunraku.http.authorization import AuthorizationMiddleware, add_security_scheme, collect_route_rules
+from bunraku.http.client_address import ClientAddressMiddleware, TrustedProxies
 from bunraku.http.cors import CorsMiddleware
 from bunraku.http.origin import parse_origins
 from bunraku.http.problem_details import install_problem_handlers
-from bunraku.http.protocol import HttpProtocol
-from bunraku.page_files import create_page_app
+from bunraku.http.protocol import HttpLoad, HttpProtocol
+from bunraku.http.response_headers import ContentSecurityMiddleware
+from bunraku.page_files import create_page_app, reference_response
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
@@ -79,15 +83,15 @@ async def compose_app(
         apps = {name: create() for name, create in factories.items() if name in (*services, ACCESS_SERVICE)}
         readiness = Readiness(context, [backend for name in apps for backend in REQUIRED_BACKENDS.get(name, ())])
 
-        app = FastAPI(title="Bunraku", version=__version__, docs_url="/v1/docs", openapi_url="/v1/openapi.json")
+        app = FastAPI(title="Bunraku", version=__version__, openapi_url=None)
         install_problem_handlers(app)
-        routes = list(app.router.routes)
         install_health_routes(app, readiness)
+        routes: list[BaseRoute] = []
         for service in apps.values():
             await stack.enter_async_context(service.router.lifespan_context(service))
             app.include_router(service.router)
             routes += service.router.routes
-        routes.append(_add_version_route(app))
+        routes += _add_public_routes(app)
         add_security_scheme(app)
         _add_middleware(app, context, routes)
         if "page" in services:
@@ -119,14 +123,27 @@ def _service_factories(context: ServiceContext) -> dict[str, ServiceFactory]:
     }
 
 
-def _add_version_route(app: FastAPI) -> BaseRoute:
+def _add_public_routes(app: FastAPI) -> list[BaseRoute]:
+    """Add the routes of the version and of the API's description, and return them."""
+    first = len(app.router.routes)
+
+    @app.get("/v1/openapi.json", include_in_schema=False)
+    @requires(None)
+    async def openapi() -> JSONResponse:
+        return JSONResponse(app.openapi())
+
+    @app.get("/v1/docs", include_in_schema=False)
+    @requires(None)
+    async def reference() -> Response:
+        return reference_response(PAGE_FOLDER)
+
     @app.get("/v1/health", tags=["health"])
     @requires(None)
     async def health() -> dict[str, Any]:
         """Return the version of the running process."""
         return {"status": "ok", "version": __version__}
 
-    return app.router.routes[-1]
+    return app.router.routes[first:]
 
 
 def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRoute]) -> None:
@@ -134,12 +151,14 @@ def _add_middleware(app: FastAPI, context: ServiceContext, routes: list[BaseRout
     app.add_middleware(AuthorizationMiddleware, context=context, rules=collect_route_rules(routes))
     if origins := parse_origins(context.settings.origins):
         app.add_middleware(CorsMiddleware, origins=origins)
+    app.add_middleware(ContentSecurityMiddleware)
     app.add_middleware(AccessLogMiddleware, metrics=context.metrics, clock=context.clock)
+    app.add_middleware(ClientAddressMiddleware, proxies=TrustedProxies.parse(context.settings.trusted_proxies))
 
 
 def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -> None:
     """Make the API description of `app` include the services that other processes run."""
-    description = FastAPI(title=app.title, version=app.version)
+    description = FastAPI(title=app.title, version=app.version, openapi_url=None)
     description.include_router(app.router)
     for create in other_services:
         router = create().router
@@ -153,7 +172,7 @@ def _describe_all_services(app: FastAPI, other_services: list[ServiceFactory]) -
 def uvicorn_protocol_options() -> dict[str, Any]:
     """Return uvicorn's options for the HTTP and WebSocket protocols."""
     return {
-        "http": HttpProtocol,
+        "http": partial(HttpProtocol, HttpLoad()),
         "ws": HandoffProtocol,
         "ws_max_size": MAX_CLIENT_MESSAGE_BYTES,
         "ws_per_message_deflate": False,
@@ -201,6 +220,8 @@ async def serve(
                 app,
                 **uvicorn_protocol_options(),
                 lifespan="off",
+                # ClientAddressMiddleware takes the client's address from the header
+                proxy_headers=False,
                 # the command configures logging; at level INFO uvicorn would log queries, which may contain tickets
                 log_config=None,
                 log_level="warning",

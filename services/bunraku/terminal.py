@@ -5,17 +5,42 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import Awaitable, Callable
+from json import dumps
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 from urllib.parse import unquote, urlsplit
 
 import typer
 from rich.console import Console
+from rich.highlighter import JSONHighlighter
+from rich.text import Text
+
+from bunraku.runtime.display_text import escape_text
 
 if TYPE_CHECKING:
     from bunraku.client.api import Client
 
-out = Console()
-err = Console(stderr=True)
+
+class TerminalConsole(Console):
+    """Console on which texts of servers and files have no effect but to be seen.
+
+    Every string, also one in a table, is printed on one line, with characters that control a terminal or its reader as
+    escapes and without the markup of rich.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(markup=False, emoji=False, **options)
+
+    def render_str(self, text: str, **options: Any) -> Text:
+        return super().render_str(escape_text(text), **options)
+
+    def print_json(self, json: str | None = None, *, data: Any = None, **options: Any) -> None:
+        """Print `data` as indented JSON; the escapes keep it valid."""
+        document = json if json is not None else dumps(data, indent=2, ensure_ascii=False, **options)
+        self.print(JSONHighlighter()(Text(escape_text(document, keep="\n"))), soft_wrap=True)
+
+
+out = TerminalConsole()
+err = TerminalConsole(stderr=True)
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 ServerOption = Annotated[str, typer.Option("--server", envvar="BUNRAKU_SERVER", help="Address of a running server.")]
@@ -29,8 +54,8 @@ Result = TypeVar("Result")
 
 
 def print_plain(text: str) -> None:
-    """Print text without markup, highlighting or line wrapping."""
-    out.print(text, markup=False, highlight=False, soft_wrap=True)
+    """Print a line of text without highlighting or wrapping."""
+    out.print(text, highlight=False, soft_wrap=True)
 
 
 def print_statistics(statistics: dict[str, Any], as_json: bool) -> None:

@@ -6,9 +6,10 @@ from datetime import datetime
 import httpx2
 import pytest
 
-from bunraku.access.app import DEFAULT_SHARE_LIFETIME_S, MAX_SHARE_LIFETIME_S
+from bunraku.access.app import DEFAULT_SHARE_LIFETIME_S
 from bunraku.http import ticket_store
 from bunraku.http.access_control import Role
+from bunraku.http.access_token import MAX_SHARE_LIFETIME_S
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.servers import make_bvh_clip, run_server
 
@@ -65,7 +66,9 @@ def test_list_is_limited_to_the_requested_number_of_own_links(http: httpx2.Clien
     for _ in range(3):
         assert http.post("/v1/shares", json={"motion": motion}, headers=headers).status_code == 201
     assert len(http.get("/v1/shares?limit=2", headers=headers).json()["items"]) == 2
-    assert len(http.get("/v1/shares", headers=headers).json()["items"]) == 3
+    listed = http.get("/v1/shares", headers=headers)
+    assert len(listed.json()["items"]) == 3
+    assert listed.headers["cache-control"] == "no-store"
 
 
 def test_ticket_response_is_not_cacheable(http: httpx2.Client) -> None:
@@ -75,6 +78,34 @@ def test_ticket_response_is_not_cacheable(http: httpx2.Client) -> None:
     assert answer.headers["cache-control"] == "no-store"
 
 
-def test_too_many_tickets_are_a_429(http: httpx2.Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ticket_store, "MAX_TICKETS", 0)
-    assert http.post("/v1/tickets").status_code == 429
+def test_too_many_tickets_are_a_429_for_their_subject_only(
+    http: httpx2.Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ticket_store, "MAX_TICKETS_PER_HOLDER", 3)
+    flooder, other = (bearer_headers(make_token(Role.VIEW, subject)) for subject in ("flooder", "other"))
+    statuses = [http.post("/v1/tickets", headers=flooder).status_code for _ in range(5)]
+    assert statuses == [201] * 3 + [429] * 2
+    assert http.post("/v1/tickets", headers=other).status_code == 201
+
+
+def test_link_ends_with_the_token_that_created_it(http: httpx2.Client, motion: str) -> None:
+    headers = bearer_headers(make_token(Role.CONTROL, "aiko", lifetime_s=3_600))
+    created = http.post("/v1/shares", json={"motion": motion, "seconds": MAX_SHARE_LIFETIME_S}, headers=headers).json()
+    lifetime = datetime.fromisoformat(created["expires"]) - datetime.fromisoformat(created["created"])
+    assert lifetime.total_seconds() <= 3_600
+    created = http.post("/v1/shares", json={"motion": motion, "seconds": MAX_SHARE_LIFETIME_S}).json()
+    lifetime = datetime.fromisoformat(created["expires"]) - datetime.fromisoformat(created["created"])
+    assert lifetime.total_seconds() == MAX_SHARE_LIFETIME_S
+
+
+def test_bound_token_creates_links_within_its_bound_only(http: httpx2.Client, motion: str) -> None:
+    session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
+    other = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
+    for bound, expected in (
+        ({"session": session}, [201, 404, 403]),
+        ({"motion": motion}, [404, 404, 201]),
+    ):
+        headers = bearer_headers(make_token(Role.CONTROL, "bound", **bound))
+        requests = ({"session": session}, {"session": other}, {"motion": motion})
+        statuses = [http.post("/v1/shares", json=body, headers=headers).status_code for body in requests]
+        assert statuses == expected

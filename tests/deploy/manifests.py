@@ -45,7 +45,8 @@ def find_kubectl() -> str:
 def render_overlay(folder: Path, overlay: str) -> list[Manifest]:
     """Render an overlay in a copy in `folder`, with its settings files made by the commands of the README."""
     program = find_kubectl()
-    shutil.copytree(KUBERNETES, folder / "kubernetes", ignore=shutil.ignore_patterns("secret.env"))
+    ignored = shutil.ignore_patterns("secret.env", "*.crt", "*.key")
+    shutil.copytree(KUBERNETES, folder / "kubernetes", ignore=ignored)
     script = readme_commands("> secret.env").replace(
         "deploy/kubernetes/overlays/laptop", f"kubernetes/overlays/{overlay}"
     )

@@ -8,7 +8,14 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
+from tests.certificates import Authority
 from tests.processes import find_program, free_port
+
+
+def create_certificates(folder: Path) -> None:
+    """Create the authority `ca.crt` and the certificate `tls.crt` that servers on this machine present."""
+    folder.mkdir()
+    Authority(folder, "ca").issue("tls", "localhost", "127.0.0.1")
 
 
 def localize_config(file: Path, folder: Path, replacements: Mapping[str, str]) -> Path:

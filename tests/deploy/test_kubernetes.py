@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import re
+import ssl
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -11,10 +13,11 @@ import kubernetes_validate
 import pytest
 import yaml
 
+from bunraku.runtime.tls import create_client_context
 from bunraku.serve import SERVICES
 from tests.conftest import REPOSITORY
 from tests.deploy.manifests import KUBERNETES, OVERLAYS, RenderedOverlay, find_kubectl, render_overlay
-from tests.deploy.test_compose import DOCKERFILE, OWN_IMAGES, STOCK_IMAGES
+from tests.deploy.test_compose import DOCKERFILE, OWN_IMAGES, exchange_handshake
 from tests.deploy.test_compose import SERVICES as ALL_COMPOSE_SERVICES
 from tests.deploy.test_gateway import read_handles
 
@@ -24,12 +27,17 @@ KUBERNETES_VERSIONS = ("1.27", "1.32", "1.37")
 """Versions of Kubernetes; the first is the oldest that the README supports."""
 COMPOSE_ONLY = {
     "BUNRAKU_PUBLISHED": "a cluster always has a secret",
+    "BUNRAKU_SECRET": "a file in a cluster",
+    "BUNRAKU_SECRET_BEFORE": "as BUNRAKU_SECRET",
 }
 """Variables set by Compose only, and the reason."""
 KUBERNETES_ONLY = {
     "BUNRAKU_BUS_PASSWORD": "the pod, not Compose, builds addresses from it",
     "BUNRAKU_CATALOGUE_PASSWORD": "as for the bus",
     "BUNRAKU_SITE": "the gateway's, in the settings shared by all",
+    "BUNRAKU_PROXIES": "part of BUNRAKU_TRUSTED_PROXIES",
+    "BUNRAKU_REQUEST_TIMEOUT": "the gateway's",
+    "BUNRAKU_SECRETS": "the folder of the files",
     "BUNRAKU_LOGS": "logs of a cluster are collected as JSON",
     "BUNRAKU_LOG_LEVEL": "set together with BUNRAKU_LOGS",
     "BUNRAKU_METRICS": "each pod has a separate port",
@@ -103,7 +111,7 @@ def test_container_settings_equal_compose(laptop: RenderedOverlay, name: str) ->
     compose_service, container, pod = COMPOSE_SERVICES[name], laptop.container(name), laptop.pods()[name]
     image, _, tag = container["image"].partition(":")
     assert image == compose_service["image"].partition(":")[0]
-    assert image in OWN_IMAGES or container["image"] in STOCK_IMAGES
+    assert image in OWN_IMAGES
     assert tag not in ("", "latest")
     assert container.get("args") == compose_service.get("command")
     user = {"postgres": "999:999"}.get(name, compose_service["user"])
@@ -121,6 +129,7 @@ def test_environment_equals_compose(laptop: RenderedOverlay, name: str) -> None:
     for variable in set(compose_service) & set(environment):
         # compare the default, with a reference to the password variable
         expected = re.sub(r"\$\{(\w*PASSWORD):-bunraku\}", r"$(\1)", str(compose_service[variable]))
+        expected = expected.replace("* ${BUNRAKU_PROXIES:-127.0.0.1/32}", "* $(BUNRAKU_PROXIES)")
         expected = re.sub(r"^\$\{\w+:-(.*)\}$", r"\1", expected)
         if environment[variable].startswith("<"):
             secret = re.match(r"\$[({](\w+)", re.sub(r"\$\{(\w+):-.*", r"$(\1)", str(compose_service[variable])))
@@ -148,11 +157,19 @@ def test_volumes_and_memory_folders_equal_compose(laptop: RenderedOverlay) -> No
         persistent = {one["metadata"]["name"] for one in templates} | (claims & set(volumes))
         mounts = {one["mountPath"]: one["name"] for one in container["volumeMounts"]}
         for volume in compose_service["volumes"]:
-            source, _, target = volume.rpartition(":")
+            source, _, target = volume.removesuffix(":ro").rpartition(":")
+            if target == "/run/certificate":
+                # in a cluster the certificate of a backend is a secret
+                continue
             assert target in mounts, volume
+            if source.endswith("-certificate"):
+                assert volumes[mounts[target]] == {"name": "authority", "configMap": volumes["authority"]["configMap"]}
+                continue
             # in a cluster the gateway stores no certificates
             assert not source or name == "gateway" or mounts[target] == source in persistent
         expected_memory = {**(tmpfs_sizes(compose_service) if "tmpfs" in compose_service else {})}
+        if expected_memory.pop("/run/tls", None):
+            assert volumes[mounts["/run/tls"]]["secret"]["secretName"].startswith(f"{name}-tls-")
         if "shm_size" in compose_service:
             expected_memory["/dev/shm"] = mebibytes(compose_service["shm_size"])
         memory_mounts = {
@@ -228,7 +245,7 @@ def test_only_the_gateway_is_reachable_from_outside(rendered: RenderedOverlay) -
     kinds = {name: one["spec"].get("type", "ClusterIP") for name, one in rendered.of("Service").items()}
     assert {name for name, kind in kinds.items() if kind != "ClusterIP"} <= {"gateway"}
     policies = {name: one["spec"] for name, one in rendered.of("NetworkPolicy").items()}
-    assert policies["nobody"] == {"podSelector": {}, "policyTypes": ["Ingress"]}
+    assert policies["nobody"] == {"podSelector": {}, "policyTypes": ["Ingress", "Egress"]}
     open_to_all = {name for name, one in policies.items() for rule in one.get("ingress", ()) if "from" not in rule}
     assert open_to_all == {"gateway"}
     for name in ("nats", "postgres"):
@@ -246,6 +263,61 @@ def test_only_the_gateway_is_reachable_from_outside(rendered: RenderedOverlay) -
                 assert pods
                 for pod in pods:
                     assert port["port"] in {named["name"] for named in pod["spec"]["containers"][0]["ports"]}
+
+
+def egress_peers(policies: dict[str, Any], name: str) -> set[tuple[str, int | str]]:
+    """Return the pods and ports that a policy lets its pods connect to."""
+    found = set()
+    for rule in policies[name]["egress"]:
+        for port in rule.get("ports", ({"port": "any"},)):
+            for peer in rule.get("to", ({},)):
+                labels = peer.get("podSelector", {}).get("matchLabels") or peer.get("namespaceSelector", {}).get(
+                    "matchLabels", {"": "anywhere"}
+                )
+                found.add((next(iter(labels.values())), port["port"]))
+    return found
+
+
+def test_pods_reach_only_what_they_need(rendered: RenderedOverlay) -> None:
+    policies = {name: one["spec"] for name, one in rendered.of("NetworkPolicy").items()}
+    dns: tuple[str, int | str] = ("kube-system", 53)
+    assert egress_peers(policies, "gateway") == {("service", "http"), dns}
+    assert egress_peers(policies, "service") == {("nats", "bus"), ("postgres", "sql"), dns}
+    assert egress_peers(policies, "postgres") == set()
+    assert egress_peers(policies, "nats") == {("nats", "any"), dns}
+    # the library of a cluster is elsewhere
+    others = policies.keys() - {"nobody", "gateway", "service", "postgres", "nats"}
+    assert {peer for name in others for peer in egress_peers(policies, name)} <= {("anywhere", 443)}
+
+
+def test_secrets_of_tokens_are_files(rendered: RenderedOverlay) -> None:
+    for name in SERVICES:
+        assert not {"BUNRAKU_SECRET", "BUNRAKU_SECRET_BEFORE"} & rendered.environment(name).keys()
+        folder = rendered.environment(name)["BUNRAKU_SECRETS"]
+        (mount,) = (one for one in rendered.container(name)["volumeMounts"] if one["mountPath"] == folder)
+        (volume,) = (one for one in rendered.pods()[name]["volumes"] if one["name"] == mount["name"])
+        paths = {item["path"] for one in volume["projected"]["sources"] for item in one["secret"]["items"]}
+        assert paths == {"BUNRAKU_SECRET", "BUNRAKU_SECRET_BEFORE"}
+
+
+def test_certificates_of_the_readme_are_accepted_by_clients(rendered: RenderedOverlay, tmp_path: Path) -> None:
+    authority = tmp_path / "ca.crt"
+    authority.write_text(rendered.one("ConfigMap", "authority")["data"]["ca.crt"])
+    client = create_client_context(str(authority))
+    # Python 3.13 verifies by this flag
+    client.verify_flags |= ssl.VerifyFlags.VERIFY_X509_STRICT
+    for service, hosts in (("nats", ["nats", "nats-0.nats", "nats-2.nats"]), ("postgres", ["postgres"])):
+        data = rendered.one("Secret", f"{service}-tls")["data"]
+        for name in ("tls.crt", "tls.key"):
+            (tmp_path / name).write_bytes(base64.b64decode(data[name]))
+        server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+        server.load_cert_chain(tmp_path / "tls.crt", tmp_path / "tls.key")
+        for host in hosts:
+            exchange_handshake(client, server, host)
+        with pytest.raises(ssl.SSLCertVerificationError):
+            exchange_handshake(client, server, "gateway")
+    # the key of the authority is not kept
+    assert all("ca.key" not in one.get("data", {}) for one in rendered.manifests)
 
 
 def test_pods_are_replaced_one_at_a_time(rendered: RenderedOverlay) -> None:
@@ -332,12 +404,11 @@ def test_image_tags_equal_the_package_version(laptop: RenderedOverlay) -> None:
     version = re.search(r"^ARG VERSION=(\S+)$", DOCKERFILE, re.MULTILINE)
     assert version is not None
     for name, container in laptop.containers():
-        if name != "postgres":
-            assert container["image"].endswith(f":{version[1]}")
+        assert container["image"].endswith(f":{version[1]}"), name
 
 
 def test_git_ignores_settings_files() -> None:
-    files = ["secret.env", "settings.env"]
+    files = ["secret.env", "settings.env", "ca.crt", "nats.key", "postgres.key"]
     ignored = [f"deploy/kubernetes/overlays/cluster/{name}" for name in files]
     if not (REPOSITORY / ".git").exists():
         pytest.skip("this is no repository")

@@ -14,7 +14,7 @@ from bunraku.messaging.bus_nats import NatsBus
 from bunraku.messaging.key_value_nats import NatsKeyValueStore
 from bunraku.runtime.availability import BackendUnavailable
 from tests.deploy.manifests import KUBERNETES
-from tests.deploy.nats_config import localize_config
+from tests.deploy.nats_config import create_certificates, localize_config
 from tests.processes import ServerProcess, find_program, free_port
 
 SERVERS = 3
@@ -27,12 +27,17 @@ def servers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Se
     program = find_program("nats-server")
     routes = [free_port() for _ in range(SERVERS)]
     routes_url = ",".join(f"nats://bunraku:0123abcd@127.0.0.1:{port}" for port in routes)
+    create_certificates(tmp_path / "tls")
     with ExitStack() as stack:
         started = []
         for number in range(SERVERS):
             folder = tmp_path / f"nats-{number}"
             folder.mkdir()
-            replacements = {"0.0.0.0:6222": f"127.0.0.1:{routes[number]}", "/var/lib/nats": str(folder / "store")}
+            replacements = {
+                "0.0.0.0:6222": f"127.0.0.1:{routes[number]}",
+                "/var/lib/nats": str(folder / "store"),
+                "/run/tls": str(tmp_path / "tls"),
+            }
             file, port = localize_config(CONFIG, folder, replacements), free_port()
             # each has a name, as the pods of the cluster have
             command = ["env", f"BUNRAKU_BUS_NAME=nats-{number}", program, f"--config={file}", f"--routes={routes_url}"]
@@ -55,8 +60,11 @@ async def put_when_available(key_values: NatsKeyValueStore, key: str, value: byt
                 return
 
 
-async def test_key_value_store_survives_the_loss_of_any_one_server(servers: list[ServerProcess]) -> None:
-    bus = NatsBus("nats://" + ",".join(f"bunraku:0123abcd@127.0.0.1:{server.port}" for server in servers))
+async def test_key_value_store_survives_the_loss_of_any_one_server(
+    servers: list[ServerProcess], tmp_path: Path
+) -> None:
+    addresses = ",".join(f"bunraku:0123abcd@127.0.0.1:{server.port}" for server in servers)
+    bus = NatsBus(f"tls://{addresses}?ca={tmp_path}/tls/ca.crt")
     await bus.open(20)
     try:
         key_values = NatsKeyValueStore(bus, SERVERS)

@@ -7,7 +7,6 @@ from __future__ import annotations
 import asyncio
 import json
 import statistics
-import subprocess
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager, suppress
@@ -25,7 +24,7 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.wire.messages import SUBPROTOCOL, unpack
 from bunraku.wire.overlay import Overlay
 from tests.conftest import REPOSITORY
-from tests.deploy.nats_config import localize_config
+from tests.deploy.nats_config import create_certificates, localize_config
 from tests.processes import ServerProcess, find_program, free_port
 from tests.servers import make_bvh_clip, run_server
 
@@ -33,18 +32,6 @@ PASSWORD = "0123abcd"
 TIMEOUT_S = 60
 REQUIRED_OVERLAYS = 60
 """Overlays that every viewer must receive."""
-
-
-def create_certificates(folder: Path) -> None:
-    """Create a certificate authority and the one certificate that hub and leaf both present."""
-    program = find_program("openssl")
-    steps = (
-        "req -x509 -newkey ed25519 -nodes -days 2 -subj /CN=ours -keyout ca.key -out ca.crt",
-        "req -newkey ed25519 -nodes -subj /CN=bus -addext subjectAltName=IP:127.0.0.1 -keyout tls.key -out tls.csr",
-        "x509 -req -in tls.csr -days 2 -CA ca.crt -CAkey ca.key -CAcreateserial -copy_extensions copy -out tls.crt",
-    )
-    for step in steps:
-        subprocess.run([program, *step.split()], cwd=folder, check=True, capture_output=True)
 
 
 class RegionDeployment:
@@ -57,7 +44,7 @@ class RegionDeployment:
         self.urls: dict[str, str] = {}
 
     def bus(self, name: str) -> str:
-        return f"nats://bunraku:{PASSWORD}@127.0.0.1:{self.buses[name].port}"
+        return f"tls://bunraku:{PASSWORD}@127.0.0.1:{self.buses[name].port}?ca={self.folder}/tls/ca.crt"
 
     def leaf_message_count(self) -> int:
         """Return the number of messages that the hub has sent to the leaf."""
@@ -70,7 +57,6 @@ class RegionDeployment:
 def regions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RegionDeployment]:
     monkeypatch.setenv("BUNRAKU_BUS_PASSWORD", PASSWORD)
     deployment, leaf_port, tls = RegionDeployment(tmp_path), free_port(), tmp_path / "tls"
-    tls.mkdir()
     create_certificates(tls)
     replacements = {
         "hub": {
@@ -92,7 +78,7 @@ def regions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[RegionD
             (tmp_path / name).mkdir()
             source = REPOSITORY / "deploy" / f"nats-{name}.conf"
             file, port = (
-                localize_config(source, tmp_path / name, {**own_replacements, "/etc/bunraku/tls": str(tls)}),
+                localize_config(source, tmp_path / name, {**own_replacements, "/run/tls": str(tls)}),
                 free_port(),
             )
             command = [find_program("nats-server"), "-c", str(file), "-a", "127.0.0.1", "-p", str(port)]

@@ -329,20 +329,52 @@ async def test_revoking_a_link_closes_its_connections(guarded: GuardedServer) ->
 
 
 async def test_websocket_closes_when_its_token_expires(guarded: GuardedServer) -> None:
-    for path in ("stream", "control"):
-        address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/{path}"
-        token = bearer_headers(make_token(Role.CONTROL, lifetime_s=2))
-        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=token) as socket:
+    token = bearer_headers(make_token(Role.CONTROL, lifetime_s=5))
+
+    async def watch_until_closed(address: str, headers: dict[str, str]) -> int:
+        async with connect(address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=headers) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
             assert closed.value.rcvd is not None
-            assert closed.value.rcvd.code == 4401
+            return closed.value.rcvd.code
+
+    connections = []
+    async with httpx2.AsyncClient(base_url=guarded.url, headers=token) as http:
+        for path in ("stream", "control"):
+            address = guarded.url.replace("http", "ws") + f"/v1/sessions/{guarded.session}/{path}"
+            ticket = (await http.post("/v1/tickets")).json()["ticket"]
+            connections += [watch_until_closed(address, token), watch_until_closed(f"{address}?ticket={ticket}", {})]
+    assert await asyncio.gather(*connections) == [4401] * 4
 
 
-async def test_protected_resource_is_not_cached_by_proxies(guarded: GuardedServer) -> None:
-    async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token())) as http:
+@pytest.mark.parametrize("token", [make_token(), make_token(Role.VIEW), None, "malformed"])
+def test_no_response_of_a_protected_route_is_cached_by_proxies(guarded: GuardedServer, token: str | None) -> None:
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(token), timeout=60) as http:
+        for (method, path), role in ROUTES.items():
+            if role is None or method == "DELETE":
+                continue
+            for used_method in (method, "HEAD", "PUT"):
+                for ids in (guarded.fill_path(path), guarded.fill_path(path).replace(guarded.motion, UNKNOWN_ID)):
+                    headers = http.request(used_method, ids).headers
+                    directives = headers["cache-control"].split(", ")
+                    assert "public" not in directives
+                    assert "no-store" in directives or (
+                        "private" in directives and "Authorization" in headers["vary"]
+                    ), (used_method, ids, headers)
+
+
+def test_immutable_resources_stay_in_private_caches(guarded: GuardedServer) -> None:
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(make_token())) as http:
         for path in (f"/v1/motions/{guarded.motion}/blocks/0/0", "/v1/arms/393-351-256-560-320-120/table"):
-            assert "private" in (await http.get(path)).headers["cache-control"]
+            assert http.get(path).headers["cache-control"] == "private, max-age=31536000, immutable"
+        etag = http.get(path).headers["etag"]
+        unchanged = http.get(path, headers={"If-None-Match": etag})
+        assert (unchanged.status_code, unchanged.headers["vary"]) == (304, "Authorization")
+        assert unchanged.headers["cache-control"] == "private, max-age=31536000, immutable"
+        for path in ("/v1/shares", "/v1/uploads/unknown-upload"):
+            assert http.get(path).headers["cache-control"] == "no-store"
+        for path in ("/v1/motions", "/v1/sessions", f"/v1/motions/{guarded.motion}"):
+            assert http.get(path).headers["cache-control"] == "private, no-cache"
 
 
 def test_server_without_secret_allows_every_request(tmp_path: Path) -> None:

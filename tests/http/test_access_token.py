@@ -1,14 +1,32 @@
 from __future__ import annotations
 
+import dataclasses
 import string
+from typing import Any
 
+import jwt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.http.access_control import Access, Role
-from bunraku.http.access_token import MAX_TOKEN_LENGTH, InvalidToken, TokenSigner
-from tests.credentials import OTHER_SECRET, SECRET, make_claims, make_unsigned_token, sign_token
+from bunraku.http.access_token import (
+    CLOCK_SKEW_S,
+    MAX_SHARE_LIFETIME_S,
+    MAX_TOKEN_LENGTH,
+    MAX_TOKEN_LIFETIME_S,
+    InvalidToken,
+    TokenSigner,
+)
+from bunraku.runtime.display_text import clean_text
+from tests.credentials import (
+    OTHER_SECRET,
+    SECRET,
+    make_claims,
+    make_unsigned_token,
+    sign_nested_token,
+    sign_token,
+)
 
 NOW = 1_800_000_000
 IDS = st.text(string.ascii_letters + string.digits + "_-", min_size=1, max_size=64)
@@ -21,22 +39,27 @@ SIGNER = TokenSigner(SECRET)
     session=st.none() | IDS,
     motion=st.none() | IDS,
     share=st.none() | IDS,
-    seconds=st.integers(1, 10**7),
+    seconds=st.integers(1, 2 * MAX_SHARE_LIFETIME_S),
 )
 def test_minted_token_verifies_until_it_expires(
     role: Role, subject: str, session: str | None, motion: str | None, share: str | None, seconds: int
 ) -> None:
     access = Access(role, subject, session, motion, NOW + seconds, share)
-    if access.is_bound and role > Role.CONTROL:
-        with pytest.raises(ValueError, match="cannot be bound"):
+    is_link = role is Role.VIEW and (session is None) != (motion is None)
+    max_lifetime_s = MAX_TOKEN_LIFETIME_S if share is None else MAX_SHARE_LIFETIME_S
+    is_permitted = (is_link if share is not None else not access.is_bound or role <= Role.CONTROL) and (
+        seconds <= max_lifetime_s
+    )
+    if not is_permitted:
+        with pytest.raises(ValueError, match="the server would reject this token"):
             SIGNER.mint(access, NOW)
         return
     token = SIGNER.mint(access, NOW)
-    if len(token) <= MAX_TOKEN_LENGTH:
-        assert SIGNER.verify(token, NOW) == SIGNER.verify(token, NOW + seconds - 1) == access
-        with pytest.raises(InvalidToken) as bad:
-            SIGNER.verify(token, NOW + seconds)
-        assert bad.value.reason == "expired"
+    expected = dataclasses.replace(access, subject=clean_text(subject, 64))
+    assert SIGNER.verify(token, NOW) == SIGNER.verify(token, NOW + seconds - 1) == expected
+    with pytest.raises(InvalidToken) as bad:
+        SIGNER.verify(token, NOW + seconds)
+    assert bad.value.reason == "expired"
 
 
 @pytest.mark.parametrize(
@@ -53,6 +76,35 @@ def test_minted_token_verifies_until_it_expires(
         (sign_token(exp=True), "expiry time is not a number"),
         (sign_token(exp="9999999999"), "not a "),
         (sign_token(exp=float("inf")), "not a "),
+        (sign_token(exp=float("nan")), "not a "),
+        (sign_token(exp=4e9), "not a "),
+        (sign_token(exp=[4_000_000_000]), "not a "),
+        (sign_token(exp=10**40), "lifetime is more than 7 days"),
+        (sign_token(exp=4_000_000_000), "lifetime is more than 7 days"),
+        (sign_token(exp=-5), "expiry time is not a number"),
+        (sign_token(iat=-1), "time of issue is not a number"),
+        (sign_token(iat=True), "time of issue is not a number"),
+        (sign_token(iat="now"), "not a "),
+        (sign_token(iat=0), "lifetime is more than 7 days"),
+        (sign_token(iat=10**40), "not valid yet"),
+        (sign_token(nbf=4_000_000_000), "not valid yet"),
+        (sign_token(nbf=False), "start of validity is not a number"),
+        (sign_token(nbf=1.5), "start of validity is not a number"),
+        (sign_token(nbf="1"), "not a "),
+        (sign_token(share="s1"), "a link has the role view"),
+        (sign_token(share="s1", role="control", session="s"), "a link has the role view"),
+        (sign_token(share="s1", role="view"), "a link has the role view"),
+        (sign_token(share="s1", role="view", session="s", motion="m"), "a link has the role view"),
+        (sign_token(share=True, role="view", session="s"), "share in a token must be an id"),
+        (sign_token(role=True), "unknown role"),
+        (sign_token(role="view", session=""), "session in a token must be an id"),
+        (sign_token(role="view", session=False), "session in a token must be an id"),
+        (sign_token(sub=5), "not a "),
+        (sign_token(jti=5), "not a "),
+        (sign_token(jti=""), "jti"),
+        (sign_token(jti="x" * 65), "jti"),
+        (sign_token(aud=["bunraku", "other"]), "another audience"),
+        (sign_nested_token(), "not a JSON Web Token"),
         (sign_token(role="owner"), "unknown role"),
         (sign_token(role=["admin"]), "unknown role"),
         (sign_token(role="view", session="a.b"), "session in a token must be an id"),
@@ -71,6 +123,61 @@ def test_invalid_token_is_rejected_with_a_reason(token: str, detail: str) -> Non
     with pytest.raises(InvalidToken, match=detail) as bad:
         SIGNER.verify(token, make_claims()["iat"])
     assert bad.value.reason == "invalid"
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        {"crit": ["exp"]},
+        {"crit": ["b64"], "b64": True},
+        {"kid": "1"},
+        {"typ": "at+jwt"},
+        {"typ": None},
+        {"cty": "JWT"},
+        {"jku": "https://evil.example/keys"},
+        {"zip": "DEF"},
+    ],
+)
+def test_token_with_an_extended_header_is_rejected(header: dict[str, Any]) -> None:
+    # PyJWT omits typ if it is None
+    claims = make_claims()
+    token = jwt.encode(claims, SECRET, "HS256", headers=header)
+    if header == {"typ": None}:
+        assert SIGNER.verify(token, claims["iat"]).role is Role.ADMIN
+        return
+    with pytest.raises(InvalidToken):
+        SIGNER.verify(token, claims["iat"])
+
+
+def test_times_of_issue_and_validity_may_be_ahead_by_the_clock_skew() -> None:
+    claims = make_claims(iat=NOW, nbf=NOW + 10, exp=NOW + MAX_TOKEN_LIFETIME_S)
+    token = jwt.encode(claims, SECRET, "HS256")
+    assert SIGNER.verify(token, NOW + 10 - CLOCK_SKEW_S).subject == "guest"
+    with pytest.raises(InvalidToken, match="not valid yet"):
+        SIGNER.verify(token, NOW + 9 - CLOCK_SKEW_S)
+    # the time left never exceeds the maximum by more than the skew
+    with pytest.raises(InvalidToken, match="lifetime"):
+        SIGNER.verify(jwt.encode({**claims, "exp": claims["exp"] + 1}, SECRET, "HS256"), NOW + 10)
+
+
+def test_only_a_link_may_last_longer_than_a_week() -> None:
+    link = Access(Role.VIEW, "share s1", session="s", expires=NOW + MAX_SHARE_LIFETIME_S, share="s1")
+    assert SIGNER.verify(SIGNER.mint(link, NOW), NOW) == link
+    for access in (
+        dataclasses.replace(link, share=None),
+        dataclasses.replace(link, expires=NOW + MAX_SHARE_LIFETIME_S + 1),
+        Access(Role.VIEW, expires=NOW + MAX_TOKEN_LIFETIME_S + 1),
+        Access(Role.VIEW, expires=NOW),
+        Access(Role.VIEW, session="a.b", expires=NOW + 60),
+        dataclasses.replace(link, role=Role.CONTROL),
+    ):
+        with pytest.raises(ValueError, match="the server would reject this token"):
+            SIGNER.mint(access, NOW)
+
+
+def test_subject_is_cleaned() -> None:
+    token = sign_token(sub="\x1b[31mai\u202eko\x00 ")
+    assert SIGNER.verify(token, make_claims()["iat"]).subject == "aiko"
 
 
 @given(st.text(max_size=300) | st.binary(max_size=300).map(lambda data: data.decode("latin-1")))

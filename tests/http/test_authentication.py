@@ -1,9 +1,11 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from contextlib import AsyncExitStack, asynccontextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -74,11 +76,52 @@ async def test_link_grants_one_resource_until_revoked(tmp_path: Path) -> None:
         assert not await authenticator.can_view(access, "session", "s2")
         assert not await authenticator.can_view(access, "motion", "m")
         ticket = authenticator.tickets.issue(access)
-        assert await authenticator.revoke_share(share.id)
-        assert not await authenticator.revoke_share(share.id)
+        assert await authenticator.revocations.revoke(share.id)
+        assert not await authenticator.revocations.revoke(share.id)
         assert await rejection_title(authenticator, token) == "Link revoked"
         with pytest.raises(ProblemError, match="was revoked"):
             await authenticator.authenticate_ticket(ticket)
+
+
+async def test_link_ends_with_the_access_that_created_it_except_for_admins(tmp_path: Path) -> None:
+    async with open_test_context(tmp_path) as context:
+        authenticator = context.authenticator
+        soon = int(time.time()) + 3_600
+        for role, is_shortened in ((Role.CONTROL, True), (Role.INGEST, True), (Role.ADMIN, False)):
+            share, token = await authenticator.create_share(Access(role, "host", expires=soon), None, "m", 86_400)
+            assert (share.expires == soon) is is_shortened
+            assert (await authenticator.authenticate_token(token)).expires == share.expires
+        share, _ = await authenticator.create_share(Access(Role.CONTROL, "host", expires=soon), None, "m", 60)
+        assert share.expires < soon
+
+
+async def test_links_of_one_subject_are_limited(tmp_path: Path) -> None:
+    async with open_test_context(tmp_path, quota_links="2") as context:
+        authenticator = context.authenticator
+        shares = [(await authenticator.create_share(HOST, "s1", None, 600))[0] for _ in range(2)]
+        with pytest.raises(ProblemError, match="at most 2 links") as raised:
+            await authenticator.create_share(HOST, "s1", None, 600)
+        assert (raised.value.status, raised.value.title) == (403, "Quota used up")
+        await authenticator.create_share(Access(Role.CONTROL, "another"), "s1", None, 600)
+        await authenticator.revocations.revoke(shares[0].id)
+        await authenticator.create_share(HOST, "s1", None, 600)
+
+
+async def test_token_of_a_link_grants_no_more_than_its_row(tmp_path: Path) -> None:
+    async with open_test_context(tmp_path) as context:
+        authenticator = context.authenticator
+        share, _ = await authenticator.create_share(HOST, "s1", None, 600)
+        claims: dict[str, Any] = {"role": "view", "share": share.id, "session": "s1", "exp": share.expires}
+        assert (await authenticator.authenticate_token(sign_token(**claims))).session == "s1"
+        overrides: list[dict[str, Any]] = [
+            {"session": "s2"},
+            {"session": None, "motion": "s1"},
+            {"exp": share.expires + 1},
+        ]
+        for forged in overrides:
+            assert await rejection_title(authenticator, sign_token(**{**claims, **forged})) == "Link not valid"
+        unknown = {"share": "0" * 18, "exp": int(time.time()) + 20 * 86_400}
+        assert await rejection_title(authenticator, sign_token(**{**claims, **unknown})) == "Link revoked"
 
 
 async def test_ticket_expires_with_its_token(tmp_path: Path) -> None:
@@ -123,10 +166,10 @@ async def test_revocation_reaches_all_replicas_even_after_a_bus_outage(tmp_path:
                     Access(Role.VIEW, expires=share.expires, share=share.id), reasons[-1].set_result
                 )
             async with asyncio.timeout(20):
-                await first.revoke_share(shares[0].id)
+                await first.revocations.revoke(shares[0].id)
                 assert (await reasons[0]).title == "Link revoked"
                 # a message published during the outage is lost; links are checked after reconnecting
                 await asyncio.to_thread(server.kill)
-                await first.revoke_share(shares[1].id)
+                await first.revocations.revoke(shares[1].id)
                 await asyncio.to_thread(server.start)
                 assert (await reasons[1]).title == "Link revoked"

@@ -2,17 +2,21 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import h11
 import pytest
+import uvicorn
+from uvicorn.server import ServerState
 
-from bunraku.http import protocol
+from bunraku.http import protocol, request_body
+from bunraku.http.protocol import HttpLoad, HttpProtocol
 from bunraku.runtime import transport
 from tests.servers import run_server
 
-TIMEOUT_S = 20
+TIMEOUT_S = 120
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +115,7 @@ UPGRADE = (
         (UPGRADE + b"Content-Length: 10\r\n\r\n", 400),
         (UPGRADE + b"Transfer-Encoding: chunked\r\n\r\n", 400),
         (UPGRADE + b"a: b\r\n" * 129 + b"\r\n", 431),
+        (UPGRADE + b"Sec-WebSocket-Protocol: ,,\x7f\r\n\r\n", 400),
         (UPGRADE + b"a: " + b"b" * 9_000 + b"\r\n\r\n", 431),
         (UPGRADE.replace(b"none", b"n" * 9_000) + b"\r\n", 414),
         (UPGRADE + b"\r\n" + b"\x89\x80\0\0\0\0" * 1_000, 400),
@@ -149,23 +154,74 @@ async def test_response_to_a_client_that_does_not_read_is_bounded(url: str, monk
     writer.close()
 
 
-async def test_body_in_tiny_chunks_does_not_delay_others(url: str) -> None:
-    head = b"POST /v1/motions?filename=a.bvh HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\n"
-    flooding = asyncio.create_task(exchange(url, head + b"1\r\nx\r\n" * 50_000 + b"0\r\n\r\n"))
-    answered = 0
-    while not flooding.done():
-        reader, writer = await open_connection(url)
-        writer.write(b"GET /v1/health HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n")
-        assert b'"ok"' in await read_until_closed(reader)
-        writer.close()
-        answered += 1
-    # several requests are served while the body is parsed
-    assert answered > 3
-    assert (await flooding)[:9] == b"HTTP/1.1 "
+class RecordingTransport(asyncio.Transport):
+    """Transport that records whether reading is paused."""
+
+    def __init__(self) -> None:
+        super().__init__({"socket": None, "sockname": ("127.0.0.1", 80), "peername": ("127.0.0.1", 9)})
+        self.protocol: asyncio.BaseProtocol
+        self.is_paused = False
+        self.is_closed = False
+
+    def set_write_buffer_limits(self, high: int | None = None, low: int | None = None) -> None: ...
+
+    def get_protocol(self) -> asyncio.BaseProtocol:
+        return self.protocol
+
+    def pause_reading(self) -> None:
+        self.is_paused = True
+
+    def resume_reading(self) -> None:
+        self.is_paused = False
+
+    def write(self, _: bytes | bytearray | memoryview) -> None: ...
+
+    def is_closing(self) -> bool:
+        return self.is_closed
+
+    def close(self) -> None:
+        self.is_closed = True
+
+    def abort(self) -> None:
+        self.is_closed = True
+
+
+async def test_body_in_tiny_chunks_is_parsed_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(request_body, "MAX_SMALL_CHUNKS", 100_000)
+
+    async def app(_: object, receive: Callable[[], Awaitable[dict[str, object]]], __: object) -> None:
+        while (await receive())["type"] != "http.disconnect":
+            continue
+
+    config = uvicorn.Config(app, lifespan="off", log_config=None)
+    config.load()
+    load = HttpLoad()
+    connections = [HttpProtocol(load, config, ServerState(), {}) for _ in range(2)]
+    transports = [RecordingTransport() for _ in connections]
+    for connection, connected in zip(connections, transports, strict=True):
+        connected.protocol = connection
+        connection.connection_made(connected)
+    first, second = connections
+    first.data_received(b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" + b"1\r\nx\r\n" * 10_000)
+    # this takes far longer than a turn, so that the rest waits and nothing more is read
+    assert load.is_parsing
+    assert transports[0].is_paused
+    # data of others waits for its turn, not for the end of the first body
+    second.data_received(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
+    assert second.conn.their_state is h11.IDLE
+    for _ in range(10):
+        # each iteration of the event loop parses data of one connection
+        await asyncio.sleep(0)
+    assert second.conn.their_state is not h11.IDLE
+    assert load.is_parsing
+    for connection, connected in zip(connections, transports, strict=True):
+        connected.abort()
+        connection.connection_lost(None)
+    await asyncio.gather(*first.tasks, *second.tasks, return_exceptions=True)
 
 
 async def test_oldest_waiting_connection_makes_room_for_a_new_one(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(protocol, "MAX_PENDING_CONNECTIONS", 5)
+    monkeypatch.setattr(protocol, "MAX_WAITING_CONNECTIONS", 5)
     monkeypatch.setattr(protocol, "HEADER_TIMEOUT_S", 60.0)
     waiting = [await open_connection(url) for _ in range(5)]
     for _ in range(5):

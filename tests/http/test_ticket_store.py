@@ -47,16 +47,40 @@ async def test_ticket_expires_and_is_removed() -> None:
     assert len(store._issued) == 1
 
 
-async def test_number_of_tickets_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ticket_store, "MAX_TICKETS", 3)
+async def test_number_of_tickets_is_limited_by_subject_and_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ticket_store, "MAX_TICKETS_PER_HOLDER", 3)
     clock = Clock()
     store = TicketStore(MemoryBus(), clock)
-    for _ in range(3):
-        store.issue(ACCESS)
+    tickets = [store.issue(ACCESS, "192.0.2.1") for _ in range(3)]
     with pytest.raises(TooManyTickets):
-        store.issue(ACCESS)
+        store.issue(ACCESS, "192.0.2.1")
+    # another subject, and another viewer with the same link
+    store.issue(Access(Role.VIEW, "ben"), "192.0.2.1")
+    store.issue(ACCESS, "192.0.2.2")
+    # a used ticket does not count
+    await store.redeem(tickets[1])
+    store.issue(ACCESS, "192.0.2.1")
+    with pytest.raises(TooManyTickets):
+        store.issue(ACCESS, "192.0.2.1")
     clock.now = TICKET_LIFETIME_S
-    store.issue(ACCESS)
+    store.issue(ACCESS, "192.0.2.1")
+
+
+async def test_full_store_takes_tickets_from_their_largest_holder(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ticket_store, "MAX_TICKETS", 20)
+    store = TicketStore(MemoryBus())
+    flood = Access(Role.VIEW, "share flood")
+    kept = [store.issue(Access(Role.VIEW, name)) for name in ("aiko", "ben")]
+    flooding = [store.issue(flood, f"192.0.2.{number % 3}") for number in range(100)]
+    kept += [store.issue(Access(Role.VIEW, name)) for name in ("chiyo", "dan")]
+    assert len(store._issued) == 20
+    assert all([await store.redeem(ticket) for ticket in kept])
+    redeemed = [await store.redeem(ticket) is not None for ticket in flooding]
+    assert sum(redeemed) == 16
+    # the newest stay
+    assert all(redeemed[-15:])
+    assert not store._issued
+    assert not store._keys_by_holder
 
 
 @given(st.text(max_size=80) | st.text("0123456789abcdef*>.", min_size=48, max_size=48))

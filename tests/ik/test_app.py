@@ -173,8 +173,8 @@ def test_largest_batch_is_solved(client: TestClient) -> None:
     np.testing.assert_array_equal(msgpack.unpackb(response.content)["arms"]["tip"], expected.tip)
 
 
-def test_openapi_document_lists_the_paths(client: TestClient) -> None:
-    document = client.get("/openapi.json").json()
+def test_openapi_document_lists_the_paths() -> None:
+    document = create_app().openapi()
     assert set(document["paths"]) == {
         "/v1/arms/{proportions}/table",
         "/v1/arms/{proportions}/figures/{name}",

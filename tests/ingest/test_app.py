@@ -7,6 +7,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from bunraku.runtime.display_text import clean_text
 from tests.servers import make_bvh_clip, run_server
 
 
@@ -35,6 +36,32 @@ async def test_upload_creates_a_motion_once(server: str) -> None:
     repeated = await post(server, data, "other name.bvh")
     assert (repeated.status_code, repeated.json()) == (200, motion)
     assert (await get(server, f"/v1/motions/{motion['id']}")).json() == motion
+
+
+HOSTILE = "\x1b]0;owned\x07\x00\u202e\u2066\u200b\x9b2J"
+"""Text of which nothing can be seen."""
+
+
+async def test_names_are_cleaned_where_they_enter(server: str) -> None:
+    data = make_bvh_clip(seed=42).replace(b"skullbase", "skullbase\x07\u202e".encode())
+    motion = (await post(server, data, f"{HOSTILE}人形\u3000👍🏽 か\u3099.bvh")).json()
+    assert (motion["name"], motion["filename"]) == ("人形\u3000👍🏽 が", "人形\u3000👍🏽 が.bvh")
+    assert motion["joints"]["skullbase"] == "skullbase"
+    long = (await post(server, make_bvh_clip(seed=44), f"v1.{'踊' * 248}.bvh")).json()
+    assert (long["name"], len(long["filename"])) == (f"v1.{'踊' * 197}", 255)
+    unnamed = (await post(server, make_bvh_clip(seed=43), HOSTILE)).json()
+    assert (unnamed["name"], unnamed["filename"]) == ("unnamed", "unnamed")
+
+
+async def test_problem_that_quotes_a_request_or_a_file_is_cleaned(server: str) -> None:
+    rejected = await post(server, f"HIERARCHY\nROOT Hips{HOSTILE}\n{{ WRONG{HOSTILE}".encode(), f"a{HOSTILE}.bvh")
+    missing = await get(server, "/v1/none/%1B%5D0;owned%07%E2%80%AE")
+    for answer, status in ((rejected, 422), (missing, 404)):
+        assert answer.status_code == status
+        texts = [text for text in answer.json().values() if isinstance(text, str)]
+        assert len(texts) > 3
+        assert all(text == clean_text(text, 1_000) for text in texts)
+    assert rejected.json()["filename"] == "a.bvh"
 
 
 async def test_motions_are_listed_by_page_and_removed(tmp_path: Path) -> None:

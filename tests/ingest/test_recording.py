@@ -84,7 +84,7 @@ async def test_session_is_recorded_as_a_motion(context: ServiceContext, motion_i
     assert motion["tracks"] == ["motion", "camera"]
     assert motion["joints"] == known.description["joints"]
     assert [len(track[0]) for track in stored.packets] == [2, 2]
-    named = (await send_request(context, make_request(name=" My duet ")))["motion"]
+    named = (await send_request(context, make_request(name=" My \x1b[31mdu\u202eet\n ")))["motion"]
     assert named["name"] == "My duet"
     assert named["id"] != motion["id"]
     page, _ = await context.catalogue.list_motions(9)

@@ -14,7 +14,7 @@ import uvloop
 from bunraku.messaging import nats_connection
 from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.bus_nats import NatsBus
-from bunraku.messaging.nats_connection import NatsServer, parse_servers
+from bunraku.messaging.nats_address import NatsServer, parse_servers
 from bunraku.runtime.availability import BackendUnavailable
 from tests.messaging.message_recorder import MessageRecorder, flush_buses
 from tests.processes import ServerProcess, nats_url_of, run_nats_server

@@ -103,3 +103,19 @@ def test_second_configuration_replaces_the_first() -> None:
     log.configure_logging("json", "", "all", second)
     logging.getLogger("bunraku").info("once")
     assert (len(parse_log_lines(first)), len(parse_log_lines(second))) == (0, 1)
+
+
+def test_plain_line_escapes_texts_of_clients() -> None:
+    output = io.StringIO()
+    log.configure_logging("plain", "info", "all", output)
+    hostile = "/v1/\x1b[2J\u202e\n2026[info]forged"
+    try:
+        raise ValueError(hostile)
+    except ValueError:
+        logging.getLogger("bunraku.http").exception("refused %s", hostile, extra={"path": hostile})
+    text = output.getvalue()
+    assert "\x1b" not in text
+    assert "\u202e" not in text
+    head, *traceback = text.splitlines()
+    assert head.count(r"/v1/\u001b[2J\u202e\u000a2026[info]forged") == 2
+    assert traceback[0].startswith("Traceback")

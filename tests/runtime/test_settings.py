@@ -79,3 +79,34 @@ def test_invalid_value_is_rejected_with_the_valid_ones(
     with pytest.raises(ValueError, match=message) as raised:
         Settings(data=tmp_path)
     assert name in describe_setting_error(raised.value)
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        {"bus": "tls://me:password@a,nats://b"},
+        {"bus": "nats://me:password@a?ca=/ca.crt"},
+        {"catalogue": "postgres://me:password@a/b"},
+        {"catalogue": "postgresql://me:password@a/b?sslmode=verify"},
+    ],
+)
+def test_invalid_address_is_rejected_without_its_password(setting: dict[str, str]) -> None:
+    with pytest.raises(ValidationError, match=r"invalid (bus address|catalogue URL)") as raised:
+        Settings.model_validate(setting)
+    assert "password" not in str(raised.value) + describe_setting_error(raised.value)
+
+
+def test_secrets_are_read_from_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BUNRAKU_SECRETS", str(tmp_path))
+    monkeypatch.setenv("BUNRAKU_SECRET", "")
+    monkeypatch.setenv("BUNRAKU_UPLOAD_BYTES", "5")
+    (tmp_path / "BUNRAKU_SECRET").write_text("a secret in a file, long enough for a key\n")
+    (tmp_path / "bunraku_catalogue").write_text("postgresql://me:word@a/b")
+    (tmp_path / "unrelated").write_text("1")
+    settings = Settings(data=tmp_path)
+    assert settings.secret.get_secret_value() == "a secret in a file, long enough for a key"
+    assert settings.catalogue == "postgresql://me:word@a/b"
+    assert settings.upload_bytes == 5
+    monkeypatch.setenv("BUNRAKU_SECRETS", str(tmp_path / "none"))
+    with pytest.raises(ValueError, match="none, which is not a folder"):
+        Settings()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -34,6 +35,15 @@ async def test_limb_is_granted_to_the_first_claim_until_released(server: str, se
             while any((await client.session(session))["limbs"]):  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         await aiko.claim("left_hand")
+
+
+async def test_name_of_a_puppeteer_is_cleaned(server: str, session: str) -> None:
+    names = ("\x1b]0;owned\x07愛子\u202e\u200b 👩🏽\u200d🚀", "\u2066\x00\u3164", "か\u3099" * 50)
+    async with Client(server) as client, AsyncExitStack() as puppeteers:
+        for name in names:
+            await puppeteers.enter_async_context(Puppeteer(client, session, name))
+        shown = [one["name"] for one in (await client.session(session))["puppeteers"]]
+    assert shown == ["愛子 👩🏽\u200d🚀", "Someone", "が" * 40]
 
 
 async def test_silent_holder_loses_the_limb(server: str, session: str) -> None:

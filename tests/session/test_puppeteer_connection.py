@@ -8,7 +8,7 @@ import pytest
 from bunraku.session.counters import RATE_LIMITED, SessionCounters
 from bunraku.session.notice_throttle import MAX_MESSAGES_PER_S
 from bunraku.session.puppeteer_connection import MAX_QUEUED_MESSAGES, PUPPETEER_FRAMES, PuppeteerConnection
-from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.connection import FRAMES_PER_TURN, WebSocketConnection
 from bunraku.websocket.frame import Opcode
 from bunraku.websocket.heartbeat import HEARTBEAT_TIMEOUT_US
 from bunraku.websocket.subprotocol import CloseConnection
@@ -88,6 +88,8 @@ async def test_flood_is_disconnected(message: Any) -> None:
     puppet.open()
     frame = client_frame(Opcode.BINARY, message.pack())
     puppet.socket.data_received(frame * 20_000)
+    for _ in range(20_000 // FRAMES_PER_TURN):
+        await asyncio.sleep(0)
     assert puppet.problems() == ["Too many messages"]
     assert len(puppet.stage.received) <= PUPPETEER_FRAMES.burst + 1
 

@@ -13,12 +13,12 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import session_manager
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import Claim, Grant, Presence, TimelineState, Welcome, unpack
 from bunraku.wire.overlay import Overlay
+from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.vectors.blocks import random_motion
 
 MOTIONS = ("one", "two")
@@ -88,14 +88,14 @@ class SessionMessages:
         return found[0]
 
 
-async def join_session(context: ServiceContext, stage: StageProxy, name: str) -> PuppeteerConnection:
-    connection = PuppeteerConnection()
+async def join_session(context: ServiceContext, stage: StageProxy, name: str) -> RecordingPuppeteer:
+    connection = RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     await stage.join(connection, name)
     return connection
 
 
-def received(connection: PuppeteerConnection, kind: type) -> list[object]:
+def received(connection: RecordingPuppeteer, kind: type) -> list[object]:
     return [message for message in map(unpack, connection.queued) if isinstance(message, kind)]
 
 

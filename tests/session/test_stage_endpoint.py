@@ -14,12 +14,12 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import Claim
+from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.vectors.blocks import random_motion
 
 
@@ -64,8 +64,8 @@ async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncItera
     await opened.close()
 
 
-async def join_stage(context: ServiceContext, name: str) -> tuple[StageProxy, PuppeteerConnection]:
-    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+async def join_stage(context: ServiceContext, name: str) -> tuple[StageProxy, RecordingPuppeteer]:
+    stage, connection = StageProxy("s", context.bus, context.key_values), RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     await stage.join(connection, name)
     return stage, connection
@@ -93,7 +93,7 @@ async def test_join_of_a_full_stage_gives_503(context: ServiceContext, monkeypat
 
 @pytest.mark.usefixtures("endpoint")
 async def test_unknown_puppeteer_is_notified(context: ServiceContext) -> None:
-    stage, connection = StageProxy("s", context.bus, context.key_values), PuppeteerConnection()
+    stage, connection = StageProxy("s", context.bus, context.key_values), RecordingPuppeteer()
     context.bus.subscribe(stage.outgoing_subject(connection), connection.send)
     stage.send(connection, None)
     assert not connection.is_unknown

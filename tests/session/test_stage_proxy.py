@@ -6,9 +6,9 @@ import pytest
 from bunraku.messaging.bus import MemoryBus
 from bunraku.messaging.key_value import MemoryKeyValueStore
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage_proxy import StageProxy
+from tests.session.recording_puppeteer import RecordingPuppeteer
 
 
 @pytest.mark.parametrize("session", ["", "*", ">", "a.b", "a b", "../x", "é", "a" * 65, "a\n"])
@@ -64,7 +64,7 @@ async def test_requests_and_responses_are_plain_values() -> None:
 async def test_messages_of_a_puppeteer_are_published_in_order() -> None:
     bus, published = MemoryBus(), []
     bus.subscribe("session.s.said", lambda message: published.append(msgpack.unpackb(message)))
-    stage, connection = StageProxy("s", bus, MemoryKeyValueStore()), PuppeteerConnection()
+    stage, connection = StageProxy("s", bus, MemoryKeyValueStore()), RecordingPuppeteer()
     for message in (b"one", b"", None):
         stage.send(connection, message)
     assert published == [[connection.id, b"one"], [connection.id, b""], [connection.id, None]]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import errno
 import hashlib
-import os
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,21 +13,15 @@ import pytest
 from bunraku.runtime.insufficient_storage import insufficient_storage, is_disk_full, translate_disk_full
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.object_storage import ObjectStorage
+from tests.disks import mount_small_disk
 from tests.servers import make_bvh_clip, run_server
 
 
 @pytest.fixture
 def small(tmp_path: Path) -> Iterator[Path]:
     """Return a folder with 1 MiB of space."""
-    folder = tmp_path / "small"
-    folder.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(folder)]
-    if os.geteuid() != 0 or subprocess.run(command, capture_output=True).returncode != 0:
-        pytest.skip("only root can mount a small file system")
-    try:
+    with mount_small_disk(tmp_path / "small") as folder:
         yield folder
-    finally:
-        subprocess.run(["umount", "--lazy", str(folder)], check=True)
 
 
 def file_names(folder: Path) -> list[str]:

@@ -1,7 +1,13 @@
 from __future__ import annotations
 
+import asyncio
+from contextlib import suppress
+
+import pytest
+
+from bunraku.runtime.availability import BackendUnavailable
 from bunraku.storage.catalogue_sql import SqlCatalogue
-from bunraku.storage.record import Share
+from bunraku.storage.record import QuotaExceeded, Share
 
 
 def make_share(number: int, subject: str = "aiko", expires: int = 1_000) -> Share:
@@ -33,3 +39,40 @@ async def test_adding_a_link_removes_expired_ones(url: str) -> None:
     assert await catalogue.shares.get("s1") is None
     assert len(await catalogue.shares.list(None, 10)) == 2
     await catalogue.close()
+
+
+async def test_links_beyond_the_quota_of_their_subject_are_not_added(url: str) -> None:
+    catalogue = await SqlCatalogue.open(url)
+    shares = catalogue.shares
+    await shares.add(make_share(1, expires=50), 2)
+    await shares.add(make_share(2), 2)
+    with pytest.raises(QuotaExceeded, match="at most 2 links"):
+        await shares.add(make_share(3), 2)
+    assert await shares.get("s3") is None
+    # another subject, no quota, after an expiry, after a revocation
+    await shares.add(make_share(4, "ben"), 2)
+    await shares.add(make_share(50), 2)
+    with pytest.raises(QuotaExceeded):
+        await shares.add(make_share(51), 2)
+    await shares.remove("s2")
+    await shares.add(make_share(52), 2)
+    await shares.add(make_share(53))
+    assert [share.id for share in await shares.list("aiko", 10)] == ["s53", "s52", "s50"]
+    await catalogue.close()
+
+
+async def test_concurrent_links_of_several_replicas_do_not_exceed_the_quota(url: str) -> None:
+    replicas = [await SqlCatalogue.open(url) for _ in range(3)]
+
+    async def add(number: int) -> None:
+        # under this load a slow database may exceed the time limit: try again
+        with suppress(QuotaExceeded):
+            while True:
+                with suppress(BackendUnavailable):
+                    await replicas[number % 3].shares.add(make_share(number, expires=10_000), 5)
+                    return
+
+    await asyncio.gather(*map(add, range(30)))
+    assert len(await replicas[0].shares.list("aiko", 50)) == 5
+    for catalogue in replicas:
+        await catalogue.close()

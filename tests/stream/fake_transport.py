@@ -43,6 +43,10 @@ class FakeTransport(asyncio.Transport):
         if first:
             self.protocol.pause_writing()
 
+    def get_protocol(self) -> asyncio.BaseProtocol:
+        protocol: asyncio.BaseProtocol = self.protocol
+        return protocol
+
     def pause_reading(self) -> None: ...
 
     def resume_reading(self) -> None: ...

@@ -54,7 +54,7 @@ async def test_bytes_of_counted_connection_are_counted_once() -> None:
     one.connection.connection_lost(None)
 
 
-def test_unsent_bytes_are_those_of_unwritable_connections() -> None:
+async def test_unsent_bytes_are_those_of_unwritable_connections() -> None:
     counters, full, free = StreamCounters(), FakeViewer(), FakeViewer()
     for viewer in (full, free):
         counters.add_viewer(viewer, "session", lambda: None)

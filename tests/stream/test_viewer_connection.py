@@ -14,7 +14,7 @@ from bunraku.runtime.clock import clock
 from bunraku.stream.context import StreamContext
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS
 from bunraku.stream.track_selection import ViewerOptions
-from bunraku.stream.viewer_connection import ViewerConnection
+from bunraku.stream.viewer_connection import EDIT_INTERVAL_US, ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from bunraku.wire.messages import (
@@ -173,6 +173,29 @@ async def test_only_own_timeline_can_be_edited(motions: dict[str, StoredMotion])
             True,
             False,
         ][: 1 + has_own_timeline]
+
+
+async def test_edits_in_quick_succession_are_combined(motions: dict[str, StoredMotion]) -> None:
+    virtual_time = VirtualTime()
+    viewer, transport = ViewerConnection(virtual_time.context, ViewerOptions(has_own_timeline=True)), FakeTransport()
+    viewer.set_timeline(timeline.start("one", 9_200_000, virtual_time.now), motions["one"])
+    viewer.open(transport.open_connection(viewer))
+
+    def states() -> list[TimelineState]:
+        return [state for state in messages_of_type(TimelineState, transport)[1:] if isinstance(state, TimelineState)]
+
+    viewer.on_message(Edit(playing=False, position=1_000_000).pack())
+    assert [(state.playing, state.position) for state in states()] == [(False, 1_000_000)]
+    for position in range(0, 5_000_000, 1_000):
+        viewer.on_message(Edit(position=position).pack())
+    viewer.on_message(Edit(playing=True).pack())
+    assert len(states()) == 1
+    virtual_time.now += EDIT_INTERVAL_US
+    viewer.tick()
+    # the last value of each field counts
+    assert [(state.playing, state.position) for state in states()[1:]] == [(True, 4_999_000)]
+    viewer.tick()
+    assert len(states()) == 2
 
 
 @pytest.mark.parametrize("playing", [True, False])

@@ -1,11 +1,12 @@
 from __future__ import annotations
 
 import asyncio
+from itertools import pairwise
 from typing import Any
 
 import pytest
 
-from bunraku.websocket.connection import FrameLimit, WebSocketConnection
+from bunraku.websocket.connection import FRAMES_PER_TURN, FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import Opcode
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from tests.raw_client import client_frame
@@ -23,6 +24,10 @@ class FakeTransport(asyncio.Transport):
 
     def set_protocol(self, protocol: asyncio.BaseProtocol) -> None:
         self.protocol = protocol
+
+    def get_protocol(self) -> asyncio.BaseProtocol:
+        protocol: asyncio.BaseProtocol = self.protocol
+        return protocol
 
     def pause_reading(self) -> None:
         self.is_reading = False
@@ -106,6 +111,7 @@ FLOODS = {
     "pings": [client_frame(Opcode.PING, b"x")],
     "pongs": [client_frame(Opcode.PONG, b"x")],
     "empty messages": [client_frame(Opcode.BINARY)],
+    "one byte of a frame without end": [b"\x82\xfe\x03\xe8" + bytes(4), b"x"],
     "empty fragments": [client_frame(Opcode.BINARY, final=False), client_frame(Opcode.CONTINUATION, final=False)],
     "segments of one byte": [b"\x82", b"\xfd"],
 }
@@ -137,13 +143,31 @@ async def test_flood_is_closed_with_the_reason_and_not_parsed_further(name: str)
 async def test_flood_within_one_segment_gets_one_pong_at_most() -> None:
     transport = FakeTransport()
     connection = WebSocketConnection(transport, RecordingListener(), set(), lambda: 0, FrameLimit(0.0, 1_000.0))
-    connection.data_received(client_frame(Opcode.PING, b"1") * 400 + client_frame(Opcode.PING, b"2"))
+    connection.data_received(client_frame(Opcode.PING, b"1") * 15 + client_frame(Opcode.PING, b"2"))
     assert transport.written == b"\x8a\x012"
+
+
+async def test_other_connections_are_served_between_the_frames_of_one() -> None:
+    transport, listener = FakeTransport(), RecordingListener()
+    connection = WebSocketConnection(transport, listener, set(), lambda: 0, FrameLimit(0.0, 1_000.0))
+    connection.data_received(client_frame(Opcode.BINARY, b"m") * 100 + b"\x82")
+    turns = [len(listener.events)]
+    while len(listener.events) < 100:
+        assert not transport.is_reading
+        await asyncio.sleep(0)
+        turns.append(len(listener.events))
+    assert max(after - before for before, after in pairwise(turns)) == FRAMES_PER_TURN
+    assert turns[0] == FRAMES_PER_TURN
+    await asyncio.sleep(0)
+    assert transport.is_reading
+    # the frame that has begun continues
+    connection.data_received(b"\x81" + bytes(4) + b"n")
+    assert listener.events[-1] == "message n"
 
 
 async def test_pongs_that_answer_do_not_count() -> None:
     transport = FakeTransport()
-    connection = WebSocketConnection(transport, RecordingListener(), set(), lambda: 0, FrameLimit(0.0, 150.0))
+    connection = WebSocketConnection(transport, RecordingListener(), set(), lambda: 0, FrameLimit(0.0, 50.0))
     for _ in range(100):
         connection.data_received(client_frame(Opcode.PONG, b"payload"))
     assert not connection.is_closing
@@ -155,9 +179,8 @@ async def test_pongs_that_answer_do_not_count() -> None:
 async def test_limit_refills_with_the_clock() -> None:
     now = 0
     transport, listener = FakeTransport(), RecordingListener()
-    connection = WebSocketConnection(transport, listener, set(), lambda: now, FrameLimit(20.0, 10.0))
+    connection = WebSocketConnection(transport, listener, set(), lambda: now, FrameLimit(10.0, 5.0))
     for _ in range(100):
-        # a message that arrives alone counts as a read and a frame
         connection.data_received(client_frame(Opcode.BINARY, b"m"))
         now += 100_000
     assert not connection.is_closing

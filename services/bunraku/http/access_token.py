@@ -1,7 +1,7 @@
 """Capability tokens: JSON Web Tokens (RFC 7519) signed with the secret of the deployment.
 
-The only algorithm is HS256 (RFC 8725, section 3.1). Issuer and audience are verified, and the form of every claim.
-The module reads no clock; the time is an argument.
+The only algorithm is HS256 (RFC 8725, section 3.1). Header, issuer, audience, times and the form of every claim are
+verified (proto/http.md, 7.4). The module reads no clock; the time is an argument.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any
 import jwt
 
 from bunraku.http.access_control import Access, Role
+from bunraku.runtime.display_text import clean_text
 
 ALGORITHM = "HS256"
 ISSUER = "bunraku"
@@ -21,9 +22,18 @@ MIN_SECRET_BYTES = 32
 """A key of HS256 must be at least as long as its hash (RFC 7518, section 3.2)."""
 MAX_TOKEN_LENGTH = 2_048
 """Maximum number of characters of a token."""
+MAX_TOKEN_LIFETIME_S = 7 * 86_400
+"""Maximum time from `iat` to `exp`."""
+MAX_SHARE_LIFETIME_S = 31 * 86_400
+"""The same for a token of a link, which can be revoked."""
+CLOCK_SKEW_S = 60
+"""Tolerance for `iat` and `nbf` of an issuer whose clock is ahead. There is none for `exp`."""
+MAX_SUBJECT_CHARACTERS = 64
 _REQUIRED_CLAIMS = ["iss", "aud", "exp", "iat", "jti", "sub"]
+_HEADERS = ({"alg": ALGORITHM}, {"alg": ALGORITHM, "typ": "JWT"})
+"""The valid headers. Others announce extensions (`crit`), other keys (`kid`, `jwk`) or nested tokens (`cty`)."""
 _ID_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,64}")
-_MAX_SUBJECT_LENGTH = 64
+_MAX_JTI_CHARACTERS = 64
 
 
 class InvalidToken(Exception):
@@ -49,50 +59,55 @@ class TokenSigner:
     def mint(self, access: Access, now: float) -> str:
         """Return a token that grants `access` from `now` on, in seconds since 1970.
 
-        Raises ValueError if the access never expires, or if its role permits uploads and it is bound.
+        Raises ValueError for an access without expiry, and for a token that `verify` would reject.
         """
         if access.expires is None:
             raise ValueError("a token must have an expiry time")
-        if access.is_bound and access.role > Role.CONTROL:
-            raise ValueError(f"a token with the role {access.role.label} cannot be bound to a session or motion")
         claims: dict[str, Any] = {
             "iss": ISSUER,
             "aud": ISSUER,
             "iat": int(now),
             "exp": access.expires,
             "jti": access.share or secrets.token_hex(8),
-            "sub": access.subject,
+            "sub": clean_text(access.subject, MAX_SUBJECT_CHARACTERS),
             "role": access.role.label,
         }
         for name in ("session", "motion", "share"):
             value = getattr(access, name)
             if value is not None:
-                claims[name] = _validate_id(name, value)
-        return jwt.encode(claims, self._secrets[0], ALGORITHM)
+                claims[name] = value
+        token = jwt.encode(claims, self._secrets[0], ALGORITHM)
+        try:
+            self.verify(token, now)
+        except InvalidToken as error:
+            raise ValueError(f"the server would reject this token: {error.detail}") from None
+        return token
 
     def verify(self, token: str, now: float) -> Access:
-        """Return the access that a token grants at `now`, in seconds since 1970. Raises `InvalidToken`."""
+        """Return the access that a token grants at `now`, in seconds since 1970. Raises `InvalidToken`.
+
+        The subject is returned as `clean_text` leaves it. Whether the link of a `share` exists is not checked.
+        """
         claims = self._decode_claims(token)
-        expires = claims["exp"]
-        if not isinstance(expires, int) or isinstance(expires, bool):
-            raise InvalidToken("invalid", "its expiry time is not a number")
-        if expires <= now:
-            raise InvalidToken("expired", "it has expired")
-        subject = claims["sub"]
-        if not isinstance(subject, str) or len(subject) > _MAX_SUBJECT_LENGTH:
-            raise InvalidToken("invalid", f"its subject is not a string of at most {_MAX_SUBJECT_LENGTH} characters")
         try:
             role = Role.parse(str(claims.get("role")))
             session, motion, share = (
-                None if claims.get(name) is None else _validate_id(name, claims[name])
-                for name in ("session", "motion", "share")
+                _validate_id(name, claims[name]) if name in claims else None for name in ("session", "motion", "share")
             )
         except ValueError as error:
             raise InvalidToken("invalid", str(error)) from None
-        access = Access(role, subject, session, motion, expires, share)
-        if access.is_bound and role > Role.CONTROL:
+        if share is not None and (role is not Role.VIEW or (session is None) == (motion is None)):
+            raise InvalidToken("invalid", "a link has the role view and shows one session or one motion")
+        if (session is not None or motion is not None) and role > Role.CONTROL:
             raise InvalidToken("invalid", f"the role {role.label} cannot be bound to a session or motion")
-        return access
+        expires = _verify_times(claims, now, MAX_TOKEN_LIFETIME_S if share is None else MAX_SHARE_LIFETIME_S)
+        subject, token_id = claims["sub"], claims["jti"]
+        if not isinstance(subject, str) or len(subject) > MAX_SUBJECT_CHARACTERS:
+            detail = f"its subject is not a string of at most {MAX_SUBJECT_CHARACTERS} characters"
+            raise InvalidToken("invalid", detail)
+        if not isinstance(token_id, str) or not 0 < len(token_id) <= _MAX_JTI_CHARACTERS:
+            raise InvalidToken("invalid", f"its jti is not a string of 1 to {_MAX_JTI_CHARACTERS} characters")
+        return Access(role, clean_text(subject, MAX_SUBJECT_CHARACTERS), session, motion, expires, share)
 
     def _decode_claims(self, token: str) -> dict[str, Any]:
         """Return the claims of a token with a valid signature. Raises `InvalidToken`."""
@@ -100,7 +115,7 @@ class TokenSigner:
             raise InvalidToken("invalid", f"it has more than {MAX_TOKEN_LENGTH} characters")
         for nth, secret in enumerate(self._secrets):
             try:
-                return jwt.decode(
+                decoded = jwt.decode_complete(
                     token,
                     secret,
                     algorithms=[ALGORITHM],
@@ -108,6 +123,8 @@ class TokenSigner:
                     issuer=ISSUER,
                     options={
                         "require": _REQUIRED_CLAIMS,
+                        "strict_aud": True,
+                        # checked by `_verify_times`, with the time that the caller gives
                         "verify_exp": False,
                         "verify_iat": False,
                         "verify_nbf": False,
@@ -126,7 +143,32 @@ class TokenSigner:
                 raise InvalidToken("invalid", f"it lacks the claim {error.claim}") from None
             except (jwt.PyJWTError, ValueError, TypeError, RecursionError):
                 raise InvalidToken("invalid", "it is not a JSON Web Token") from None
+            else:
+                if decoded["header"] not in _HEADERS:
+                    raise InvalidToken("invalid", "its header has members other than alg and typ")
+                claims: dict[str, Any] = decoded["payload"]
+                return claims
         raise AssertionError
+
+
+def _verify_times(claims: dict[str, Any], now: float, max_lifetime_s: int) -> int:
+    """Return the expiry time after checking `exp`, `iat` and `nbf` (RFC 7519, section 4.1). Raises `InvalidToken`.
+
+    As a token is valid only from its issue on, a lifetime of at most `max_lifetime_s` also bounds the time left.
+    """
+    for name, label in (("exp", "expiry time"), ("iat", "time of issue"), ("nbf", "start of validity")):
+        value = claims.get(name, 0)
+        # True is an int
+        if type(value) is not int or value < 0:
+            raise InvalidToken("invalid", f"its {label} is not a number of whole seconds since 1970")
+    expires: int = claims["exp"]
+    if max(claims["iat"], claims.get("nbf", 0)) > now + CLOCK_SKEW_S:
+        raise InvalidToken("invalid", "it is not valid yet; the clocks of issuer and server may differ")
+    if expires <= now:
+        raise InvalidToken("expired", "it has expired")
+    if expires - claims["iat"] > max_lifetime_s:
+        raise InvalidToken("invalid", f"its lifetime is more than {max_lifetime_s // 86_400} days")
+    return expires
 
 
 def _validate_id(name: str, value: object) -> str:

@@ -15,17 +15,16 @@ import msgpack
 
 from bunraku.http.access_control import FULL_ACCESS, Access, Role
 from bunraku.http.access_token import InvalidToken, TokenSigner
+from bunraku.http.share_revocation import ShareRevocations
 from bunraku.http.ticket_store import TicketStore
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import Catalogue
-from bunraku.storage.record import Share
+from bunraku.storage.record import QuotaExceeded, Share
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 
-SHARE_REVOKED_SUBJECT = "shares.revoked"
-"""Bus subject of revoked links. A message is the id of a link."""
 NEW_LINK_HINT = "ask for a new link"
 _LINK_EXPIRED = ("Link expired", "this link or token has expired")
 _LINK_REVOKED = ("Link revoked", "this link was revoked")
@@ -51,13 +50,12 @@ class Authenticator:
         self._catalogue = catalogue
         self._bus = bus
         self._clock = clock
+        self._max_shares = settings.quota_links
         self._close_callbacks: dict[str, set[CloseCallback]] = {}
         self._recheck_tasks: set[asyncio.Task[None]] = set()
         self.tickets = TicketStore(bus)
-        self._subscriptions = [
-            bus.subscribe(SHARE_REVOKED_SUBJECT, self._on_share_revoked),
-            bus.on_reconnect(self._recheck_shares),
-        ]
+        self.revocations = ShareRevocations(catalogue, bus, self._close_connections)
+        self._reconnect_subscription = bus.on_reconnect(self._recheck_shares)
 
     @property
     def requires_token(self) -> bool:
@@ -96,7 +94,8 @@ class Authenticator:
     ) -> tuple[Share, str]:
         """Create a link for viewers and return it with its token.
 
-        Raises `ProblemError` 409 at a server without a secret.
+        It ends with the access of `issuer` at the latest, unless that has the role admin. Raises `ProblemError`: 409 at
+        a server without a secret, 403 if the subject has as many valid links as `quota_links` permits.
         """
         if self._tokens is None:
             raise ProblemError(
@@ -107,18 +106,18 @@ class Authenticator:
             )
         now = int(self._clock())
         expires = now + lifetime_s
+        if issuer.role is not Role.ADMIN and issuer.expires is not None:
+            expires = min(expires, issuer.expires)
         share = Share(secrets.token_hex(9), now, expires, issuer.subject, session, motion)
         token = self._tokens.mint(Access(Role.VIEW, f"share {share.id}", session, motion, expires, share.id), now)
-        await self._catalogue.add_share(share)
+        try:
+            await self._catalogue.add_share(share, self._max_shares)
+        except QuotaExceeded as error:
+            raise ProblemError(
+                403, "Quota used up", str(error), hint="revoke links that are not needed, or wait until one expires"
+            ) from None
         _log.info("%s created link %s", issuer.subject or "an unnamed client", share.id)
         return share, token
-
-    async def revoke_share(self, share_id: str) -> bool:
-        """Revoke a link and close its connections at all replicas. Return whether the link existed."""
-        existed = await self._catalogue.remove_share(share_id)
-        self._bus.publish(SHARE_REVOKED_SUBJECT, share_id.encode())
-        _log.info("link %s was revoked", share_id)
-        return existed
 
     async def can_view(self, access: Access, kind: str, resource_id: str) -> bool:
         """Return whether a client may see a resource of `kind` `motion` or `session`.
@@ -145,7 +144,8 @@ class Authenticator:
     def register_connection(self, access: Access, close: CloseCallback) -> Callable[[], None]:
         """Arrange that `close` is called when the access of an open connection expires or is revoked.
 
-        Return a function to call when the connection has ended by itself.
+        It is called at once if the link was revoked since the access was authenticated. Return a function to call when
+        the connection has ended by itself.
         """
         if access.expires is None:
             return _noop
@@ -156,6 +156,10 @@ class Authenticator:
         share = access.share
         if share is None:
             return timer.cancel
+        if self.revocations.is_refused(share):
+            timer.cancel()
+            close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
+            return _noop
         self._close_callbacks.setdefault(share, set()).add(close)
 
         def unregister() -> None:
@@ -169,18 +173,26 @@ class Authenticator:
 
     def close(self) -> None:
         """Release the bus subscriptions and discard all tickets."""
-        for subscription in self._subscriptions:
-            subscription.unsubscribe()
+        self._reconnect_subscription.unsubscribe()
+        self.revocations.close()
         for task in self._recheck_tasks:
             task.cancel()
         self.tickets.close()
 
     async def _check_share(self, access: Access) -> None:
-        if access.share is not None and await self._catalogue.get_share(access.share) is None:
+        """Raise `ProblemError` 401 unless the link of `access` exists and grants as much."""
+        if access.share is None:
+            return
+        share = None if self.revocations.is_refused(access.share) else await self._catalogue.get_share(access.share)
+        # a link may be revoked while it is looked up
+        if share is None or self.revocations.is_refused(share.id):
             raise unauthorized(*_LINK_REVOKED)
+        is_same = (share.session, share.motion) == (access.session, access.motion)
+        if not is_same or access.expires is None or access.expires > share.expires:
+            raise unauthorized("Link not valid", "this link grants more than was shared")
 
-    def _on_share_revoked(self, message: bytes) -> None:
-        for close in self._close_callbacks.pop(message.decode("ascii", "replace"), set()):
+    def _close_connections(self, share_id: str) -> None:
+        for close in self._close_callbacks.pop(share_id, set()):
             close(CloseConnection(UNAUTHORIZED, *_LINK_REVOKED))
 
     def _recheck_shares(self) -> None:
@@ -190,7 +202,7 @@ class Authenticator:
             for share in tuple(self._close_callbacks):
                 try:
                     if await self._catalogue.get_share(share) is None:
-                        self._on_share_revoked(share.encode())
+                        self._close_connections(share)
                 except BackendUnavailable as error:
                     _log.warning("cannot check for revoked links: %s", error)
 

@@ -17,7 +17,7 @@ from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.datastructures import Headers
 from starlette.routing import BaseRoute, Route, WebSocketRoute
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from bunraku.http.access_control import ACCESS_SCOPE_KEY, Access, Requirement, Role, requirement_of
@@ -26,6 +26,7 @@ from bunraku.http.authentication import unauthorized
 from bunraku.http.origin import is_allowed_origin, is_local_host, parse_origins
 from bunraku.http.problem_details import motion_not_found, problem_response, session_not_found, unavailable_response
 from bunraku.http.request_body import limit_body, too_large_detail
+from bunraku.http.response_headers import mark_cache_private
 from bunraku.http.token_bucket import KeyedTokenBuckets, client_network
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
@@ -67,12 +68,11 @@ def collect_route_rules(routes: Iterable[BaseRoute]) -> list[RouteRule]:
             raise UndeclaredRequirement(
                 f"{route} is neither an HTTP route nor a WebSocket route, so it cannot declare a requirement"
             )
-        # FastAPI's documentation pages are public
-        is_documentation = type(route) is Route and route.endpoint.__module__.startswith("fastapi.")
-        requirement = Requirement(None) if is_documentation else requirement_of(route.endpoint)
+        requirement = requirement_of(route.endpoint)
         if requirement is None:
             raise UndeclaredRequirement(
-                f"{route.path} declares no requirement: put @requires(...) below the decorator of its route"
+                f"{route.path} declares no requirement: put @requires(...) below the decorator of its route, or create "
+                "the app without FastAPI's own documentation pages (openapi_url=None)"
             )
         if isinstance(route, APIRoute) and requirement.role is not None:
             route.openapi_extra = {
@@ -144,7 +144,7 @@ class AuthorizationMiddleware:
             limit = requirement.max_body_bytes
             limited_receive = limit_body(receive, limit, self._body_timeout_s, self._monotonic_seconds)
             is_private = requirement.role is not None and self._authenticator.requires_token
-            await self._app(scope, limited_receive, _mark_cache_private(send) if is_private else send)
+            await self._app(scope, limited_receive, mark_cache_private(send) if is_private else send)
 
     async def _authorize_request(self, scope: Scope) -> Requirement:
         """Return the requirement of the route, after checking that the request meets it. Raises `ProblemError`."""
@@ -319,17 +319,3 @@ def _problem_headers(problem: ProblemError) -> dict[str, str]:
     if problem.status == 413:
         return {"Connection": "close"}
     return {"Retry-After": "1"} if problem.status == 429 else {}
-
-
-def _mark_cache_private(send: Send) -> Send:
-    """Replace `public` in Cache-Control: shared caches must not store a response that needs a token."""
-
-    async def send_private(message: Message) -> None:
-        if message["type"] == "http.response.start":
-            message["headers"] = [
-                (name, value.replace(b"public", b"private") if name.lower() == b"cache-control" else value)
-                for name, value in message["headers"]
-            ]
-        await send(message)
-
-    return send_private

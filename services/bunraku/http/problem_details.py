@@ -12,11 +12,14 @@ from starlette.exceptions import HTTPException
 
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.display_text import clean_document
 from bunraku.runtime.problem import ProblemError
 
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER_S = 2
 """Value of `Retry-After` in responses about an unavailable backend, in seconds."""
+MAX_TEXT_CHARACTERS = 1_000
+"""Maximum length of a text in a problem document."""
 
 _PROBLEM_HEADERS: dict[int, dict[str, str]] = {
     # the rest of a body that is too large is not read
@@ -49,11 +52,15 @@ def invalid_field_problem(location: tuple[int | str, ...], message: str) -> Prob
 
 
 def problem_response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:
-    """Return the HTTP response for a problem. Its `request_id` identifies the request in the logs."""
-    body = {"type": "about:blank", **problem.to_dict()}
+    """Return the HTTP response for a problem. Its `request_id` identifies the request in the logs.
+
+    Its texts may quote the request or an uploaded file: they are cleaned as names are. It is never cached.
+    """
+    body = {"type": "about:blank", **clean_document(problem.to_dict(), MAX_TEXT_CHARACTERS)}
     if request := request_id.current():
         body["request_id"] = request
-    return JSONResponse(body, problem.status, headers, MEDIA_TYPE)
+    retry = {"Retry-After": "1"} if problem.status == HTTPStatus.TOO_MANY_REQUESTS else {}
+    return JSONResponse(body, problem.status, {"Cache-Control": "no-store", **retry, **(headers or {})}, MEDIA_TYPE)
 
 
 def unavailable_response(error: BackendUnavailable) -> JSONResponse:

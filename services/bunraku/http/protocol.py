@@ -6,8 +6,9 @@ import asyncio
 import json
 import logging
 import time
+from collections import deque
 from http import HTTPStatus
-from typing import Any, ClassVar
+from typing import Any
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -19,18 +20,46 @@ from bunraku.runtime.transport import LingeringClose, WriteDeadline
 HEADER_TIMEOUT_S = 10.0
 """Time for complete request headers, from the start of the connection or the first byte. Also the time for the rest of
 a body after the response; closing the connection at once would discard the response."""
-MAX_PENDING_CONNECTIONS = 1_000
-"""Connections of a process that wait for request headers. The one that has waited longest makes room for a new one."""
+MAX_WAITING_CONNECTIONS = 1_000
+"""Connections of a server that wait for request headers. The one that has waited longest makes room for a new one."""
 MIN_PARSE_BYTES = 1 << 10
 MAX_PARSE_BYTES = 64 << 10
 """Least and most bytes that are parsed at once. A piece of chunked data may take a thousand times longer than its size
 suggests, so the number adapts to the time that the last piece took."""
+MAX_REST_BYTES = 64 << 10
+"""Longest body of which the rest is read after the response, so that the connection can continue."""
 PARSE_TIME_S = 1e-3
 """Time after which parsing of a connection's data pauses for other connections."""
 
 _log = logging.getLogger(__name__)
 # the base class warns of each malformed request; clients get the reason, and the log stays readable
 _log.setLevel(logging.ERROR)
+
+
+class HttpLoad:
+    """Connections of one server that wait: for request headers, or for their turn to be parsed."""
+
+    def __init__(self) -> None:
+        self.waiting_for_head: dict[HttpProtocol, None] = {}
+        """Connections without a complete request head, the oldest first."""
+        self._unparsed: deque[HttpProtocol] = deque()
+
+    @property
+    def is_parsing(self) -> bool:
+        """True if received data waits to be parsed."""
+        return bool(self._unparsed)
+
+    def parse_later(self, connection: HttpProtocol) -> None:
+        """Parse data of `connection` in its turn. In each iteration of the event loop one connection is parsed."""
+        self._unparsed.append(connection)
+        if len(self._unparsed) == 1:
+            connection.loop.call_soon(self._parse_next)
+
+    def _parse_next(self) -> None:
+        connection = self._unparsed.popleft()
+        if self._unparsed:
+            connection.loop.call_soon(self._parse_next)
+        connection.continue_parsing()
 
 
 class HttpProtocol(H11Protocol):
@@ -41,11 +70,9 @@ class HttpProtocol(H11Protocol):
     `tests/test_library_interfaces.py` checks them.
     """
 
-    _pending: ClassVar[dict[HttpProtocol, None]] = {}
-    """Connections of this process that wait for request headers, the oldest first."""
-
-    def __init__(self, *args: Any, **options: Any) -> None:
+    def __init__(self, load: HttpLoad, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
+        self._load = load
         self.logger = _log
         self.conn: BoundedConnection = BoundedConnection()
         self._header_timer: asyncio.TimerHandle | None = None
@@ -60,17 +87,26 @@ class HttpProtocol(H11Protocol):
         self._start_timeout()
 
     def data_received(self, data: bytes) -> None:
-        is_parsing = bool(self._unparsed)
+        is_waiting = bool(self._unparsed)
         self._unparsed += data
-        if not is_parsing:
-            self._parse()
-        elif len(self._unparsed) > MAX_PARSE_BYTES:
+        if is_waiting:
             self.transport.pause_reading()
+        elif self._load.is_parsing:
+            self._wait_for_turn()
+        else:
+            self._parse()
 
     def on_response_complete(self) -> None:
         super().on_response_complete()
-        if self.conn.their_state is h11.SEND_BODY:
+        if self.conn.their_state is not h11.SEND_BODY or self.transport.is_closing():
+            return
+        if self._rest_of_body_is_small():
             self._update_timeout()
+        else:
+            # parsing it could cost any amount of time
+            self._cancel_timeout()
+            self._unparsed.clear()
+            LingeringClose(self.transport, self.connection_lost)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         self._cancel_timeout()
@@ -87,6 +123,10 @@ class HttpProtocol(H11Protocol):
         self._cancel_timeout()
         self._unparsed.clear()
         self.transport.write(self._error_response(msg))
+        if self.cycle is not None:
+            # the application reads the rest of the body as a disconnect, and its response is discarded
+            self.cycle.disconnected = True
+            self.cycle.message_event.set()
         LingeringClose(self.transport, self.connection_lost)
 
     def pause_writing(self) -> None:
@@ -119,12 +159,16 @@ class HttpProtocol(H11Protocol):
                 self._parse_bytes = min(2 * self._parse_bytes, MAX_PARSE_BYTES)
             piece_begun_at = now
             if self._unparsed and now - begun_at > PARSE_TIME_S:
-                self.transport.pause_reading()
-                self.loop.call_soon(self._continue_parsing)
+                self._wait_for_turn()
                 break
         self._update_timeout()
 
-    def _continue_parsing(self) -> None:
+    def _wait_for_turn(self) -> None:
+        self.transport.pause_reading()
+        self._load.parse_later(self)
+
+    def continue_parsing(self) -> None:
+        """Parse data that waits."""
         if self.transport.is_closing():
             self._unparsed.clear()
             return
@@ -146,6 +190,11 @@ class HttpProtocol(H11Protocol):
         )
         return b"".join(self.conn.send(event) or b"" for event in events)
 
+    def _rest_of_body_is_small(self) -> bool:
+        """Return whether the connection can continue after the rest of an answered request's body."""
+        length = dict(self.headers).get(b"content-length", b"")
+        return length.isdigit() and int(length) <= MAX_REST_BYTES
+
     def _update_timeout(self) -> None:
         """Start or cancel the timer according to the state of the HTTP connection."""
         client_state = self.conn.their_state
@@ -156,15 +205,16 @@ class HttpProtocol(H11Protocol):
             self._cancel_timeout()
 
     def _start_timeout(self) -> None:
-        if len(self._pending) >= MAX_PENDING_CONNECTIONS:
-            oldest = next(iter(self._pending))
+        waiting = self._load.waiting_for_head
+        if len(waiting) >= MAX_WAITING_CONNECTIONS:
+            oldest = next(iter(waiting))
             oldest._cancel_timeout()
             oldest.transport.abort()
-        self._pending[self] = None
+        waiting[self] = None
         self._header_timer = self.loop.call_later(HEADER_TIMEOUT_S, self.transport.abort)
 
     def _cancel_timeout(self) -> None:
         if self._header_timer is not None:
             self._header_timer.cancel()
             self._header_timer = None
-            del self._pending[self]
+            del self._load.waiting_for_head[self]

@@ -1,4 +1,4 @@
-"""Checks of a request's head beyond those of h11, before anything acts on it."""
+"""Checks of a request beyond those of h11, before anything acts on it."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ MAX_FIELD_BYTES = 8_000
 """Maximum size of one header field."""
 MAX_FIELDS = 100
 """Maximum number of header fields."""
+MAX_FRAMING_BYTES = 128 << 10
+"""Maximum number of bytes received beyond the body, besides `MAX_FRAMING_SHARE`; it includes data not parsed yet."""
+MAX_FRAMING_SHARE = 8
+"""Maximum size of the framing of a chunked body, in sizes of the body. Chunks of one byte need five."""
 
 
 class BoundedConnection(h11.Connection):
-    """Server side of an HTTP/1.1 connection that rejects heads which are too large or ambiguous, and tiny chunks.
+    """Server side of an HTTP/1.1 connection that rejects heads which are too large or ambiguous, and endless framing.
 
     `next_event` raises `h11.RemoteProtocolError` with the status of the response, and `error` keeps it.
     """
@@ -25,14 +29,23 @@ class BoundedConnection(h11.Connection):
     def __init__(self) -> None:
         super().__init__(h11.SERVER, MAX_HEAD_BYTES)
         self.error: h11.RemoteProtocolError | None = None
+        self._received_bytes = self._body_bytes = 0
         self._chunk_limit = ChunkLimit()
+
+    def receive_data(self, data: bytes) -> None:
+        self._received_bytes += len(data)
+        super().receive_data(data)
 
     def next_event(self) -> h11.Event | type[h11.NEED_DATA] | type[h11.PAUSED]:
         try:
             event = super().next_event()
-            if isinstance(event, h11.Data) and not self._chunk_limit.add_chunk(len(event.data)):
-                _reject("the body has too many small chunks", 400)
+            if isinstance(event, h11.Data):
+                self._body_bytes += len(event.data)
+                if not self._chunk_limit.add_chunk(len(event.data)):
+                    _reject("the body has too many small chunks", 400)
+            self._check_framing()
             if isinstance(event, h11.Request):
+                self._received_bytes = self._body_bytes = 0
                 self._chunk_limit = ChunkLimit()
                 check_request_head(event)
                 if _is_websocket_upgrade(event) and self.trailing_data[0]:
@@ -41,6 +54,11 @@ class BoundedConnection(h11.Connection):
             self.error = error
             raise
         return event
+
+    def _check_framing(self) -> None:
+        """Reject chunk extensions and trailers without end (RFC 9112, section 7.1.1)."""
+        if self._received_bytes > MAX_FRAMING_BYTES + (1 + MAX_FRAMING_SHARE) * self._body_bytes:
+            _reject(f"the chunks of the body have more than {MAX_FRAMING_BYTES} bytes of framing", 400)
 
 
 def check_request_head(request: h11.Request) -> None:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import secrets
 import time
+from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 import msgpack
 
@@ -17,13 +19,28 @@ from bunraku.messaging.bus import Bus, NoResponse, Subscription
 
 TICKET_LIFETIME_S = 30.0
 MAX_TICKETS = 10_000
-"""Maximum number of unused tickets of a replica."""
+"""Maximum number of unused tickets of a replica. Beyond it, the holder with the most tickets loses its oldest."""
+MAX_TICKETS_PER_HOLDER = 1_000
+"""Maximum number of unused tickets of one subject at one address: the viewers of one link are one subject."""
 _REPLICA_ID_LENGTH = 16
 _TICKET_LENGTH = 48
 
 
 class TooManyTickets(Exception):
-    """Rejection of a new ticket, because the replica has `MAX_TICKETS` unused ones."""
+    """Rejection of a new ticket, because its holder has `MAX_TICKETS_PER_HOLDER` unused ones."""
+
+
+class TicketHolder(NamedTuple):
+    """Subject and network address of a client that requests tickets."""
+
+    subject: str
+    network: str
+
+
+class _IssuedTicket(NamedTuple):
+    expires: float
+    access: Access
+    holder: TicketHolder
 
 
 class TicketStore:
@@ -33,19 +50,24 @@ class TicketStore:
         self._bus = bus
         self._clock = clock
         self._replica_id = secrets.token_hex(_REPLICA_ID_LENGTH // 2)
-        # expiry and access by key, in order of expiry
-        self._issued: dict[str, tuple[float, Access]] = {}
+        # by key, in order of expiry
+        self._issued: dict[str, _IssuedTicket] = {}
+        # keys of the issued tickets, oldest first
+        self._keys_by_holder: dict[TicketHolder, deque[str]] = {}
         self._subscription: Subscription = bus.serve(f"tickets.{self._replica_id}", self._handle_redeem)
 
-    def issue(self, access: Access) -> str:
-        """Return a new ticket that grants `access`. Raises `TooManyTickets`."""
-        now = self._clock()
-        while self._issued and next(iter(self._issued.values()))[0] <= now:
-            del self._issued[next(iter(self._issued))]
-        if len(self._issued) >= MAX_TICKETS:
+    def issue(self, access: Access, network: str = "") -> str:
+        """Return a new ticket that grants `access` to a client at `network`. Raises `TooManyTickets`."""
+        now, holder = self._clock(), TicketHolder(access.subject, network)
+        while self._issued and next(iter(self._issued.values())).expires <= now:
+            self._remove(next(iter(self._issued)))
+        if len(self._keys_by_holder.get(holder, ())) >= MAX_TICKETS_PER_HOLDER:
             raise TooManyTickets
+        if len(self._issued) >= MAX_TICKETS:
+            self._remove(max(self._keys_by_holder.values(), key=len)[0])
         key = secrets.token_hex((_TICKET_LENGTH - _REPLICA_ID_LENGTH) // 2)
-        self._issued[key] = (now + TICKET_LIFETIME_S, access)
+        self._issued[key] = _IssuedTicket(now + TICKET_LIFETIME_S, access, holder)
+        self._keys_by_holder.setdefault(holder, deque()).append(key)
         return self._replica_id + key
 
     async def redeem(self, ticket: str) -> Access | None:
@@ -64,10 +86,21 @@ class TicketStore:
         """Discard all tickets of this replica."""
         self._subscription.unsubscribe()
         self._issued.clear()
+        self._keys_by_holder.clear()
 
     async def _handle_redeem(self, ticket_key: bytes) -> bytes:
-        expires, access = self._issued.pop(ticket_key.decode("ascii", "replace"), (0.0, None))
-        return pack_access(access) if access is not None and expires > self._clock() else b""
+        ticket = self._remove(ticket_key.decode("ascii", "replace"))
+        return pack_access(ticket.access) if ticket is not None and ticket.expires > self._clock() else b""
+
+    def _remove(self, key: str) -> _IssuedTicket | None:
+        """Remove a ticket and return it, None if it is unknown."""
+        ticket = self._issued.pop(key, None)
+        if ticket is not None:
+            keys = self._keys_by_holder[ticket.holder]
+            keys.remove(key)
+            if not keys:
+                del self._keys_by_holder[ticket.holder]
+        return ticket
 
 
 def pack_access(access: Access) -> bytes:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import hashlib
-from dataclasses import dataclass
-from functools import lru_cache
+from functools import partial
 from typing import Annotated
 
 from fastapi import Depends, FastAPI, Header, Request, Response
@@ -15,57 +13,38 @@ from bunraku.http import problem_details
 from bunraku.http.access_control import Role, requires
 from bunraku.http.large_body import BodySource, LargeBodies, large_response
 from bunraku.ik import batch
+from bunraku.ik.resource_cache import CachedResource, ResourceCache
 from bunraku.marionette import bend_table, figures
 from bunraku.marionette.proportions import Proportions
 from bunraku.runtime import worker_process
 from bunraku.runtime.problem import ProblemError
 
-MAX_CACHED_TABLES = 256
-"""Cached tables: 2 MB."""
-MAX_CACHED_FIGURES = 32
-"""Cached figures: 1 MB."""
 IMMUTABLE_CACHE_CONTROL = "public, max-age=31536000, immutable"
 
 worker_process.preload_modules("bunraku.ik.batch")
 
 
-@dataclass(frozen=True, slots=True)
-class CachedResource:
-    """Bytes of a resource and their strong entity tag."""
-
-    data: bytes
-    etag: str
-
-    @classmethod
-    def from_bytes(cls, data: bytes) -> CachedResource:
-        """Return the resource with these bytes."""
-        return cls(data, f'"{hashlib.sha256(data).hexdigest()[:32]}"')
-
-
-@lru_cache(maxsize=MAX_CACHED_TABLES)
-def cached_table(proportions: Proportions) -> CachedResource:
+def build_table(proportions: Proportions) -> bytes:
     """Return the table of proportions that are rounded to their identity."""
-    return CachedResource.from_bytes(bend_table.pack_bend_table(bend_table.build_bend_table(proportions)))
+    return bend_table.pack_bend_table(bend_table.build_bend_table(proportions))
 
 
-@lru_cache(maxsize=MAX_CACHED_FIGURES)
-def cached_figure(proportions: Proportions, name: figures.Figure) -> CachedResource:
+def build_figure(proportions: Proportions, name: figures.Figure) -> bytes:
     """Return a figure of the arm with proportions that are rounded to their identity."""
-    return CachedResource.from_bytes(figures.draw_figure(proportions, name).encode())
+    return figures.draw_figure(proportions, name).encode()
 
 
 def create_app() -> FastAPI:
     """Create the service, which has no state but its caches."""
-    app = FastAPI(title="Bunraku inverse kinematics", version=__version__)
+    app = FastAPI(title="Bunraku inverse kinematics", version=__version__, openapi_url=None)
     problem_details.install_problem_handlers(app)
-    # one table or figure at a time, in a thread, so that the event loop stays free
-    building = asyncio.Semaphore(1)
+    resources = ResourceCache()
+    # one batch at a time, in a thread, so that the event loop stays free
     solving = asyncio.Semaphore(1)
     large_bodies = LargeBodies("large batches", max_inline_bytes=batch.MAX_INLINE_BODY_BYTES)
 
-    async def table_for(proportions: Proportions) -> CachedResource:
-        async with building:
-            return await asyncio.to_thread(cached_table, proportions)
+    async def table_for(request: Request, proportions: Proportions) -> CachedResource:
+        return await resources.get(request, proportions, partial(build_table, proportions))
 
     @app.get(
         "/v1/arms/{proportions}/table",
@@ -77,9 +56,11 @@ def create_app() -> FastAPI:
         },
     )
     @requires(Role.VIEW, allow_bound=True)
-    async def arm_table(proportions: str, if_none_match: Annotated[str | None, Header()] = None) -> Response:
+    async def arm_table(
+        request: Request, proportions: str, if_none_match: Annotated[str | None, Header()] = None
+    ) -> Response:
         """Bend table of the arm with proportions `L0-L1-L2-M0-M1-M2` in thousandths or ten-thousandths."""
-        stored = await table_for(batch.parse_proportions(proportions))
+        stored = await table_for(request, batch.parse_proportions(proportions))
         return _resource_response(stored, "application/octet-stream", if_none_match)
 
     @app.get(
@@ -94,7 +75,7 @@ def create_app() -> FastAPI:
     )
     @requires(Role.VIEW, allow_bound=True)
     async def arm_figure(
-        proportions: str, name: str, if_none_match: Annotated[str | None, Header()] = None
+        request: Request, proportions: str, name: str, if_none_match: Annotated[str | None, Header()] = None
     ) -> Response:
         """Figure 8 (`circle`) or 9 (`horizontal`) of the paper for this arm: the arm while its tip follows the path,
         solved as in the paper and exactly."""
@@ -102,8 +83,7 @@ def create_app() -> FastAPI:
         if figure is None:
             hint = " or ".join(figures.FIGURES)
             raise ProblemError(404, "No such figure", f"there is no figure {name[:60]!r}", field="name", hint=hint)
-        async with building:
-            stored = await asyncio.to_thread(cached_figure, arm, figure)
+        stored = await resources.get(request, (arm, figure), partial(build_figure, arm, figure))
         return _resource_response(stored, "image/svg+xml", if_none_match)
 
     @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI_REQUEST_BODY)
@@ -116,7 +96,7 @@ def create_app() -> FastAPI:
             return large_response(await large_bodies.process(batch.solve_body, body, kind, accepted), accepted)
         solve_request = batch.decode_request(body, kind)
         proportions = batch.parse_proportions(solve_request.proportions)
-        stored = await table_for(proportions)
+        stored = await table_for(request, proportions)
         async with solving:
             answer = await asyncio.to_thread(batch.solve_batch, solve_request, proportions, stored.data, accepted)
         return Response(answer, media_type=accepted)

@@ -33,6 +33,7 @@ from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import InvalidCursor
+from bunraku.storage.removal import remove_motion
 
 UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
 """Pattern of an upload's name, which its client chooses at random."""
@@ -65,7 +66,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             await asyncio.wait((queue_task,))
             await job_queue.release_jobs()
 
-    app = FastAPI(title="Bunraku ingest", lifespan=lifespan)
+    app = FastAPI(title="Bunraku ingest", lifespan=lifespan, openapi_url=None)
     problem_details.install_problem_handlers(app)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
@@ -170,12 +171,13 @@ def create_app(context: ServiceContext) -> FastAPI:
     async def remove(motion: str, request: Request) -> None:
         """Remove a motion; sessions that play it continue. Without the role admin, only motions of one's subject."""
         access, entry = access_of(request), await context.catalogue.get_motion(motion)
-        if entry is not None and access.role < Role.ADMIN and entry.subject != access.subject:
+        if entry is None:
+            raise motion_not_found(motion)
+        if access.role < Role.ADMIN and entry.subject != access.subject:
             detail = f"{motion} was stored by another subject; removing it needs the role admin"
             raise ProblemError(403, "Not allowed", detail, needed="admin")
-        if not await context.catalogue.remove_motion(motion):
+        if not await remove_motion(context.catalogue, context.motion_store, motion):
             raise motion_not_found(motion)
-        await context.motion_store.remove(motion)
 
     return app
 

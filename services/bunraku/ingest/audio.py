@@ -15,7 +15,7 @@ from bunraku.ingest.motion_id import derive_digest, derive_job_id
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.ingest.source_file import SourceFile
+from bunraku.ingest.source_file import SourceFile, clean_filename
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
 from bunraku.storage.record import CatalogueEntry
@@ -23,7 +23,13 @@ from bunraku.storage.record import CatalogueEntry
 
 def create_audio_job(motion_id: str, digest: bytes, filename: str, subject: str) -> UploadJob:
     """Describe the job that adds the sound file with this SHA-256 digest to a motion."""
-    details = {"kind": "audio", "motion": motion_id, "digest": digest.hex(), "filename": filename, "subject": subject}
+    details = {
+        "kind": "audio",
+        "motion": motion_id,
+        "digest": digest.hex(),
+        "filename": clean_filename(filename),
+        "subject": subject,
+    }
     return UploadJob(derive_job_id(motion_id, subject, digest), details)
 
 

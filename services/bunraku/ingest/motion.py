@@ -12,14 +12,15 @@ from bunraku.ingest.motion_id import derive_job_id, derive_motion_id
 from bunraku.ingest.persistence import StoreOutcome, store_motion
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import require_result
-from bunraku.ingest.source_file import SourceFile
+from bunraku.ingest.source_file import SourceFile, clean_filename
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.display_text import clean_text
 
 
 def create_motion_job(digest: bytes, filename: str, subject: str) -> UploadJob:
     """Describe the job for a motion file with this SHA-256 digest."""
-    motion_id = derive_motion_id(digest)
+    motion_id, filename = derive_motion_id(digest), clean_filename(filename)
     job_id = derive_job_id(motion_id, subject)
     return UploadJob(job_id, {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject})
 
@@ -55,7 +56,7 @@ class MotionOperation:
             )
         result = require_result(outcome, filename=source.filename)
         description = {
-            "name": PurePath(source.filename).stem or source.filename,
+            "name": clean_text(PurePath(source.filename).stem) or source.filename,
             "filename": source.filename,
             "bytes": await asyncio.to_thread(os.path.getsize, source.path),
             **result.description,

@@ -19,10 +19,10 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.motion.placement import Placement
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.display_text import MAX_NAME_CHARACTERS, clean_text
 from bunraku.storage.record import CatalogueEntry
 from bunraku.wire.limbs import MAX_PERFORMERS
 
-MAX_NAME_LENGTH = 200
 MAX_EDITS = 16
 """Performer edits in progress at the same time; further ones get 503."""
 MAX_EDITS_PER_SUBJECT = 4
@@ -90,14 +90,15 @@ def performer_motion_names(entry: CatalogueEntry) -> list[str]:
     """Return the name of the original motion of each performer."""
     description = entry.description
     names: list[str] | None = description.get("pieces")
-    return names or [str(description.get("name") or "A dance")] * int(description.get("performers", 1))
+    name = clean_text(str(description.get("name") or "")) or "A dance"
+    return names or [name] * int(description.get("performers", 1))
 
 
 def combined_name(motion_names: list[str]) -> str:
-    """Return a name for a combination of motions, at most `MAX_NAME_LENGTH` characters."""
+    """Return a name for a combination of motions, at most `MAX_NAME_CHARACTERS` characters."""
     counts = Counter(motion_names)
     name = " + ".join(each if count == 1 else f"{each} \u00d7 {count}" for each, count in counts.items())
-    return name if len(name) <= MAX_NAME_LENGTH else f"{name[: MAX_NAME_LENGTH - 1]}\u2026"
+    return name if len(name) <= MAX_NAME_CHARACTERS else f"{clean_text(name, MAX_NAME_CHARACTERS - 1)}\u2026"
 
 
 def combined_ladder(ladders: list[list[dict[str, float]]]) -> list[dict[str, float]]:

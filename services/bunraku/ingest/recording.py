@@ -21,6 +21,7 @@ from bunraku.ingest.result import JobResult, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.recording_request import MAX_RECORDING_S, RECORDING_FPS, RecordingRequest
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.display_text import clean_text
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import CatalogueEntry
 
@@ -110,9 +111,9 @@ class RecordingOperation:
         """Return the description of a recording; its skeleton is that of the played motion."""
         motion = await self._context.catalogue.get_motion(result.description["kept_from"])
         known = motion.description if motion is not None else {}
-        title = known.get("name") or "A dance"
+        title = clean_text(known.get("name") or "") or "A dance"
         return {
-            "name": (request.name or "").strip() or f"{title.removesuffix(', kept')}, kept",
+            "name": clean_text(request.name or "") or f"{title.removesuffix(', kept')}, kept",
             "filename": "",
             "bytes": log_bytes,
             "source": f"kept from a session of {title} ({result.description['kept_from']})",

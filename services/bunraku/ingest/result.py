@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from bunraku.runtime.display_text import clean_document
 from bunraku.runtime.problem import ProblemError
+
+MAX_TEXT_CHARACTERS = 500
+"""Maximum length of a text in a motion's description."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +34,10 @@ class JobRejection:
 
 
 def require_result(outcome: JobResult | JobRejection, **problem_members: str) -> JobResult:
-    """Return a job's result; raise `ProblemError` (422), with further `problem_members`, for a rejection."""
+    """Return a job's result; raise `ProblemError` (422), with further `problem_members`, for a rejection.
+
+    The description may quote the uploaded file, for example its names of joints: its texts are cleaned.
+    """
     if isinstance(outcome, JobRejection):
         raise ProblemError(
             422,
@@ -41,4 +48,4 @@ def require_result(outcome: JobResult | JobRejection, **problem_members: str) ->
             hint=outcome.hint,
             **problem_members,
         )
-    return outcome
+    return replace(outcome, description=clean_document(outcome.description, MAX_TEXT_CHARACTERS))

@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from bunraku.runtime.display_text import clean_text
+
+MAX_FILENAME_CHARACTERS = 255
+UNNAMED_FILE = "unnamed"
+"""Name of a file whose own has no visible character."""
+
 
 @dataclass(frozen=True, slots=True)
 class SourceFile:
@@ -15,3 +21,8 @@ class SourceFile:
     """File name on the client's machine."""
     subject: str = ""
     """Subject that uploaded it."""
+
+
+def clean_filename(filename: str) -> str:
+    """Return the name that a client gives to its file, safe to display."""
+    return clean_text(filename, MAX_FILENAME_CHARACTERS) or UNNAMED_FILE

@@ -24,19 +24,21 @@ from bunraku.messaging.bus import (
     is_subject,
     validate_subject,
 )
+from bunraku.messaging.nats_address import parse_servers
 from bunraku.messaging.nats_connection import (
     CONNECT_TIMEOUT_S,
     HEARTBEAT_INTERVAL_S,
     MAX_MISSED_HEARTBEATS,
     NatsConnection,
     NatsMessage,
-    parse_servers,
 )
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendUnavailable
 
 RECONNECT_DELAY_RANGE_S = (0.1, 0.4)
 """Range of the random delay between attempts to connect, in seconds; it spreads the clients of a restarted server."""
+MAX_LOGGED_REASONS = 8
+"""Maximum number of log lines about failed attempts to connect, per outage."""
 _INBOX_SUBSCRIPTION_ID = 0
 """Id of the subscription that receives responses."""
 _NO_RESPONDERS_STATUS, _FAILED_STATUS = b"503", b"500"
@@ -49,9 +51,9 @@ class NatsBus:
     """Bus on one of several equivalent servers."""
 
     def __init__(self, url: str) -> None:
-        """`url` is `nats://host:port` or `nats://user:password@host:port`, more servers after commas.
+        """`url` is `nats://host:port`, `nats://user:password@host:port` or `tls://host:port?ca=FILE`.
 
-        Raise ValueError for another URL. `open` connects.
+        More servers follow after commas. Raise ValueError for another URL. `open` connects.
         """
         self._servers = parse_servers(url)
         self._inbox = f"_INBOX.{secrets.token_hex(12)}"
@@ -213,7 +215,7 @@ class NatsBus:
 
     async def _maintain_connection(self) -> None:
         """Connect to one server after the other, for ever."""
-        is_outage_logged = False
+        logged_reasons: set[str] = set()
         for server in cycle(random.sample(self._servers, len(self._servers))):
             subscriptions = dict(self._subscriptions)
             initial_commands = [
@@ -223,11 +225,13 @@ class NatsBus:
             try:
                 connection = await NatsConnection.open(server, self, initial_commands)
             except OSError as error:
-                if not is_outage_logged:
+                # once per reason: after a restart of the server, its certificate may be invalid
+                if str(error) not in logged_reasons and len(logged_reasons) < MAX_LOGGED_REASONS:
                     _log.warning("Bus disconnected: %s; reconnecting", error)
-                is_outage_logged, self._was_disconnected = True, True
+                    logged_reasons.add(str(error))
+                self._was_disconnected = True
             else:
-                is_outage_logged = False
+                logged_reasons.clear()
                 try:
                     self._on_connected(connection, subscriptions.keys())
                     await asyncio.wait((connection.closed,))

@@ -1,7 +1,7 @@
 """One connection to a NATS server (https://docs.nats.io/reference/reference-protocols/nats-protocol).
 
 Implements the part of NATS core that the bus needs. Writes are sent at once; messages are delivered in order as they
-are read.
+are read. A connection is encrypted if the address or the server asks for it, and then never falls back to plain text.
 """
 
 from __future__ import annotations
@@ -9,15 +9,16 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import ssl
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, cast
-from urllib.parse import unquote, urlsplit
 
 from bunraku import __version__
+from bunraku.messaging.nats_address import NatsServer, TlsOptions
+from bunraku.runtime.tls import create_client_context, describe_tls_error
 
 CONNECT_TIMEOUT_S = 1.0
-"""Time limit for connecting and for the handshake, and for sending unsent data at closing, in seconds."""
+"""Time limit for connecting and for both handshakes, and for sending unsent data at closing, in seconds."""
 HEARTBEAT_INTERVAL_S = 0.4
 """Interval between PINGs to the server, in seconds."""
 MAX_MISSED_HEARTBEATS = 3
@@ -26,38 +27,6 @@ MAX_UNSENT_BYTES = 1 << 20
 """Maximum size of the send buffer, in bytes; beyond it messages are dropped."""
 MAX_LINE_BYTES = 1 << 16
 """Maximum length of a control line of the protocol."""
-
-
-@dataclass(frozen=True, slots=True)
-class NatsServer:
-    """Address of a server; `login` holds the credentials as fields of CONNECT."""
-
-    host: str
-    port: int
-    login: dict[str, str]
-
-
-def parse_servers(url: str) -> list[NatsServer]:
-    """Parse `nats://one:4222,user:password@two:4222`; raise ValueError for an invalid address."""
-    scheme, _, rest = url.partition("://")
-    servers = []
-    for part in rest.split(","):
-        try:
-            parts = urlsplit(f"nats://{part.removeprefix('nats://')}")
-            # reading the port validates it
-            valid = scheme == "nats" and parts.hostname and parts.port != 0 and parts.path in ("", "/")
-        except ValueError:
-            valid = False
-        if not valid:
-            # without the address, which may contain a password
-            raise ValueError("invalid bus address, expected memory: or nats://host:port, more servers after commas")
-        login = {}
-        if parts.username and parts.password is None:
-            login = {"auth_token": unquote(parts.username)}
-        elif parts.username:
-            login = {"user": unquote(parts.username), "pass": unquote(parts.password or "")}
-        servers.append(NatsServer(str(parts.hostname), parts.port or 4222, login))
-    return servers
 
 
 class NatsMessage(NamedTuple):
@@ -91,6 +60,10 @@ class NatsConnection(asyncio.Protocol):
         self._info_received: asyncio.Future[None] = loop.create_future()
         self._pong_received: asyncio.Future[None] = loop.create_future()
         self._transport: asyncio.Transport
+        self._tcp_transport: asyncio.Transport
+        self._host = ""
+        self._offers_tls = False
+        self._is_parsing = True
         self._heartbeat_timer: asyncio.TimerHandle | None = None
         self._missed_heartbeats = 0
         self._receive_buffer = bytearray()
@@ -126,17 +99,47 @@ class NatsConnection(asyncio.Protocol):
             except OSError as error:
                 failure = error
             else:
+                connection._host = server.host
                 return connection
         raise failure
 
     async def _handshake(self, server: NatsServer, initial_commands: list[bytes]) -> None:
-        await self._wait_or_raise(self._info_received)
+        if server.tls is not None and server.tls.handshake_first:
+            await self._start_tls(server.tls)
+            await self._wait_or_raise(self._info_received)
+        else:
+            await self._wait_or_raise(self._info_received)
+            if server.tls is not None and not self._offers_tls:
+                raise ConnectionError(
+                    f"{server.host} does not offer TLS: add tls to the configuration of nats-server, or, if that has "
+                    "handshake_first, handshake=first to the bus address"
+                )
+            if self._offers_tls:
+                await self._start_tls(server.tls or TlsOptions())
+        self._resume_parsing()
         client = {"lang": "python", "version": __version__, "name": "bunraku", "protocol": 1, "headers": True}
         modes = {"verbose": False, "pedantic": False, "no_responders": True}
         connect = json.dumps(client | modes | server.login).encode()
         self._transport.write(b"CONNECT %b\r\n%bPING\r\n" % (connect, b"".join(initial_commands)))
         await self._wait_or_raise(self._pong_received)
         self._send_heartbeat()
+
+    async def _start_tls(self, options: TlsOptions) -> None:
+        """Encrypt the connection; raise ConnectionError unless the server proves its host name."""
+        context = await asyncio.to_thread(create_client_context, options.ca, options.certificate, options.key)
+        if self._receive_buffer or (options.handshake_first and self._info_received.done()):
+            # anybody on the path could have inserted it
+            hint = "remove handshake=first from the bus address" if options.handshake_first else "it is not trusted"
+            raise ConnectionError(f"{self._host} sent unencrypted data before the TLS handshake: {hint}")
+        try:
+            transport = await asyncio.get_running_loop().start_tls(
+                self._transport, self, context, server_hostname=self._host
+            )
+        except OSError as error:
+            raise ConnectionError(describe_tls_error(error, self._host)) from None
+        if transport is None:
+            raise ConnectionError(f"{self._host} closed the connection during the TLS handshake")
+        self._transport = transport
 
     async def _wait_or_raise(self, awaited: asyncio.Future[None]) -> None:
         await asyncio.wait((awaited, self.closed), return_when=asyncio.FIRST_COMPLETED)
@@ -170,8 +173,9 @@ class NatsConnection(asyncio.Protocol):
 
     @property
     def unsent_bytes(self) -> int:
-        """Size of the send buffer."""
-        return self._transport.get_write_buffer_size()
+        """Size of the send buffer; with TLS also of its encrypted part."""
+        size = self._transport.get_write_buffer_size()
+        return size if self._transport is self._tcp_transport else size + self._tcp_transport.get_write_buffer_size()
 
     async def close(self) -> None:
         """Close the connection; unsent data is sent if the server accepts it within `CONNECT_TIMEOUT_S`."""
@@ -199,20 +203,32 @@ class NatsConnection(asyncio.Protocol):
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         # cast: transports of uvloop do not inherit from asyncio.Transport
-        self._transport = cast(asyncio.Transport, transport)
+        self._transport = self._tcp_transport = cast(asyncio.Transport, transport)
 
     def connection_lost(self, error: Exception | None) -> None:
         if self._heartbeat_timer is not None:
             self._heartbeat_timer.cancel()
         if not self.closed.done():
+            if isinstance(error, ssl.SSLError):
+                # with TLS 1.3 a server rejects the certificate of a client only after the handshake
+                error = ConnectionError(describe_tls_error(error, self._host))
             self.closed.set_result(f"{self._close_reason}: {error}" if error else self._close_reason)
 
     def data_received(self, data: bytes) -> None:
         self._missed_heartbeats = 0
         self.receive_count += 1
         self._receive_buffer += data
+        self._parse_buffer()
+
+    def _resume_parsing(self) -> None:
+        """Go on after the first INFO, which decides whether the following data is encrypted."""
+        self._is_parsing = True
+        self._transport.resume_reading()
+        self._parse_buffer()
+
+    def _parse_buffer(self) -> None:
         start = 0
-        while not self.closed.done():
+        while self._is_parsing and not self.closed.done():
             end = self._receive_buffer.find(b"\r\n", start)
             if end < 0:
                 if len(self._receive_buffer) - start > MAX_LINE_BYTES:
@@ -266,9 +282,10 @@ class NatsConnection(asyncio.Protocol):
             case b"INFO":
                 info: dict[str, Any] = json.loads(rest)
                 self.max_payload = int(info["max_payload"])
-                if info.get("tls_required"):
-                    self.abort("the server requires TLS, which is not supported")
-                elif not self._info_received.done():
+                if not self._info_received.done():
+                    self._offers_tls = bool(info.get("tls_required") or info.get("tls_available"))
+                    self._is_parsing = False
+                    self._transport.pause_reading()
                     self._info_received.set_result(None)
             case b"-ERR":
                 # after a fatal error the server closes the connection

@@ -14,6 +14,7 @@ from bunraku.runtime.metrics import Metrics
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.motion_store import MotionStore
+from bunraku.storage.object_folder import make_durable_folder
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ async def open_context(settings: Settings) -> AsyncIterator[ServiceContext]:
     A backend may still be unavailable: it is tried again when it is used, or in the background. Raise ValueError for an
     invalid address.
     """
-    settings.data.mkdir(parents=True, exist_ok=True)
+    make_durable_folder(settings.data.resolve())
     catalogue = Catalogue(settings.catalogue_url())
     motion_store = MotionStore.open(settings.library_url())
     bus, key_values = await _open_messaging(settings.bus, settings.register_replicas)

@@ -15,10 +15,12 @@ import structlog
 from structlog.typing import EventDict, Processor
 
 from bunraku.runtime import request_id
+from bunraku.runtime.display_text import escape_text
 
 LogStyle = Literal["plain", "json"]
 LogLevel = Literal["", "debug", "info", "warning", "error"]
 ROOT_LOGGER = "bunraku"
+_MULTILINE_KEYS = ("exception", "stack")
 
 
 def configure_logging(style: LogStyle, level: LogLevel, service: str, stream: TextIO | None = None) -> None:
@@ -61,19 +63,33 @@ def _create_formatter(style: LogStyle, service: str, use_colour: bool) -> loggin
         structlog.processors.TimeStamper(fmt="iso", utc=True, key="time" if style == "json" else "timestamp"),
         add_process_fields,
     ]
-    # tracebacks without local variables, which may hold secrets
+    # tracebacks without local variables, which may hold secrets; JSON escapes by itself
     renderers: list[Processor] = (
-        [structlog.processors.format_exc_info, structlog.processors.JSONRenderer(default=str)]
+        [structlog.processors.JSONRenderer(default=str)]
         if style == "json"
         else [
+            _escape_texts,
             structlog.dev.ConsoleRenderer(
                 colors=use_colour, pad_event_to=0, exception_formatter=structlog.dev.plain_traceback
-            )
+            ),
         ]
     )
     return structlog.stdlib.ProcessorFormatter(
-        foreign_pre_chain=shared, processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *renderers]
+        foreign_pre_chain=shared,
+        processors=[
+            structlog.stdlib.ProcessorFormatter.remove_processors_meta,
+            structlog.processors.format_exc_info,
+            *renderers,
+        ],
     )
+
+
+def _escape_texts(_: Any, __: str, event: EventDict) -> EventDict:
+    """Escape what a text of a client could do to a terminal or to the lines of the log."""
+    for key, value in event.items():
+        if isinstance(value, str):
+            event[key] = escape_text(value, keep="\n" if key in _MULTILINE_KEYS else "")
+    return event
 
 
 def _supports_colour(stream: TextIO) -> bool:

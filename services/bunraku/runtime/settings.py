@@ -5,22 +5,31 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Literal
 
 from pydantic import Field, SecretStr, ValidationInfo, field_validator
-from pydantic_settings import BaseSettings, SettingsConfigDict
+from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SecretsSettingsSource, SettingsConfigDict
 
 from bunraku.http.access_token import TokenSigner
+from bunraku.http.client_address import TrustedProxies
 from bunraku.http.origin import OPAQUE_ORIGIN, parse_origins
+from bunraku.messaging.nats_address import parse_servers
 from bunraku.runtime import metrics
+from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.record import Quota
+
+MEMORY_BUS = "memory:"
+"""URL of the bus within one process."""
+SECRETS_VARIABLE = "BUNRAKU_SECRETS"
+"""Environment variable with the folder of settings that are files."""
 
 
 class Settings(BaseSettings):
     """Addresses and limits of one process."""
 
-    model_config = SettingsConfigDict(env_prefix="BUNRAKU_")
+    model_config = SettingsConfigDict(env_prefix="BUNRAKU_", hide_input_in_errors=True)
 
     data: Path = Path(".bunraku")
     """Folder of the embedded defaults."""
@@ -29,7 +38,7 @@ class Settings(BaseSettings):
     library: str = ""
     """URL of the object store for motions, `file:///...`, `s3://...` or another that obstore supports; empty: a
     folder in `data`."""
-    bus: str = "memory:"
+    bus: str = MEMORY_BUS
     """URL of the bus: `memory:` for one process, or `nats://...` with further servers after commas."""
     register_replicas: int = Field(default=1, ge=1, le=5)
     """Number of NATS servers that store the key-value bucket when it is created: 1, or 3 or 5 in a cluster."""
@@ -49,6 +58,9 @@ class Settings(BaseSettings):
 
     `null` stands for pages from files and sandboxed frames of any site; it requires a secret.
     """
+    trusted_proxies: str = ""
+    """Addresses and networks of reverse proxies whose `X-Forwarded-For` names the client, separated by commas or
+    spaces; `*` stands for whoever connects directly."""
     connects: float = 50.0
     """WebSocket connections that one address may open per second, with bursts of ten times as many; 0: unlimited."""
     body_seconds: float = 30.0
@@ -62,12 +74,32 @@ class Settings(BaseSettings):
     total_bytes: int = 0
     """Maximum bytes of motions of all subjects; 0: unlimited."""
 
+    quota_links: int = 200
+    """Maximum number of links of one subject that have not expired; 0: unlimited."""
+
     metrics: str = ""
     """`host:port` of a listener that serves only `/metrics`; empty: none."""
     logs: Literal["plain", "json"] = "plain"
     """Format of the log."""
     log_level: Literal["", "debug", "info", "warning", "error"] = ""
     """Minimum level of log messages; empty: INFO for JSON, else WARNING."""
+
+    @classmethod
+    def settings_customise_sources(
+        cls,
+        settings_cls: type[BaseSettings],
+        init_settings: PydanticBaseSettingsSource,
+        env_settings: PydanticBaseSettingsSource,
+        dotenv_settings: PydanticBaseSettingsSource,  # noqa: ARG003
+        file_secret_settings: PydanticBaseSettingsSource,  # noqa: ARG003
+    ) -> tuple[PydanticBaseSettingsSource, ...]:
+        folder = os.environ.get(SECRETS_VARIABLE)
+        if not folder:
+            return init_settings, env_settings
+        if not Path(folder).is_dir():
+            raise ValueError(f"{SECRETS_VARIABLE} is {folder}, which is not a folder")
+        # a file wins over a variable, which Compose may have set to the empty string
+        return init_settings, SecretsSettingsSource(settings_cls, folder), env_settings
 
     @field_validator("metrics")
     @classmethod
@@ -88,6 +120,26 @@ class Settings(BaseSettings):
         if secret.get_secret_value():
             TokenSigner(secret.get_secret_value())
         return secret
+
+    @field_validator("bus")
+    @classmethod
+    def _validate_bus(cls, url: str) -> str:
+        if url != MEMORY_BUS:
+            parse_servers(url)
+        return url
+
+    @field_validator("catalogue")
+    @classmethod
+    def _validate_catalogue(cls, url: str) -> str:
+        if url:
+            Catalogue(url)
+        return url
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _validate_trusted_proxies(cls, proxies: str) -> str:
+        TrustedProxies.parse(proxies)
+        return proxies
 
     @field_validator("origins")
     @classmethod

@@ -43,7 +43,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             await asyncio.wait((maintenance,))
             await sessions.close()
 
-    app = FastAPI(title="Bunraku session", lifespan=lifespan)
+    app = FastAPI(title="Bunraku session", lifespan=lifespan, openapi_url=None)
     problem_details.install_problem_handlers(app)
     app.state.sessions = sessions
 

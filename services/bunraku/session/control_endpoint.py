@@ -13,6 +13,7 @@ from starlette.websockets import WebSocket
 from bunraku.http.access_control import access_of
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.display_text import clean_text
 from bunraku.runtime.problem import ProblemError
 from bunraku.session.counters import SessionCounters
 from bunraku.session.puppeteer_connection import PUPPETEER_FRAMES, PuppeteerConnection
@@ -62,5 +63,5 @@ async def _join_stage(stage: StageProxy, connection: PuppeteerConnection, name: 
 
 
 def _display_name(name: str) -> str:
-    """Return a name for display: printable, trimmed, not empty."""
-    return "".join(c for c in name if c.isprintable()).strip()[:MAX_NAME_CHARACTERS] or "Someone"
+    """Return a name that is safe to display and not empty."""
+    return clean_text(name, MAX_NAME_CHARACTERS) or "Someone"

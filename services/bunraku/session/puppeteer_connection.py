@@ -21,14 +21,14 @@ from bunraku.wire.messages import Input, Ping, Pong, unpack
 
 MAX_QUEUED_MESSAGES = 64
 """Size of the send queue."""
-PUPPETEER_FRAMES = FrameLimit(2.0 * MAX_MESSAGES_PER_S, 4.0 * MAX_MESSAGES_PER_S)
-"""Limit above which a puppeteer is disconnected; a message counts as one frame and, if it arrives alone, one read."""
+PUPPETEER_FRAMES = FrameLimit(2.0 * MAX_MESSAGES_PER_S, 2.0 * MAX_MESSAGES_PER_S)
+"""Limit above which a puppeteer is disconnected."""
 
 
 class PuppeteerStage(Protocol):
     """Stage of a puppeteer, on any replica."""
 
-    def send(self, connection: PuppeteerConnection, message: bytes | None) -> None:
+    def send(self, puppeteer: PuppeteerConnection, message: bytes | None) -> None:
         """Send a puppeteer's message; None means that the puppeteer has left, no bytes are a heartbeat."""
 
 

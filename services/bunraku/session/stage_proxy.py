@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import msgpack
 
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.schema import SessionEdit
 
 LOG_TIMEOUT_S = 10.0
 """Timeout for storing a log of some megabytes."""
+
+
+class Puppeteer(Protocol):
+    """Puppeteer on this replica."""
+
+    id: str
 
 
 class StageProxy:
@@ -48,17 +53,17 @@ class StageProxy:
         """End the session."""
         await self._request("end", None)
 
-    async def join(self, connection: PuppeteerConnection, name: str) -> None:
+    async def join(self, puppeteer: Puppeteer, name: str) -> None:
         """Add a puppeteer. Subscribe to `outgoing_subject` first: messages follow at once."""
-        await self._request("join", [connection.id, name])
+        await self._request("join", [puppeteer.id, name])
 
-    def outgoing_subject(self, connection: PuppeteerConnection) -> str:
+    def outgoing_subject(self, puppeteer: Puppeteer) -> str:
         """Return the subject of the messages to a puppeteer."""
-        return f"{self._subject}.told.{connection.id}"
+        return f"{self._subject}.told.{puppeteer.id}"
 
-    def send(self, connection: PuppeteerConnection, message: bytes | None) -> None:
+    def send(self, puppeteer: Puppeteer, message: bytes | None) -> None:
         """Publish a puppeteer's message; None means that the puppeteer has left, no bytes are a heartbeat."""
-        self._bus.publish(f"{self._subject}.said", msgpack.packb([connection.id, message]))
+        self._bus.publish(f"{self._subject}.said", msgpack.packb([puppeteer.id, message]))
 
     async def _request(self, operation: str, payload: Any, timeout_s: float = 2.0) -> Any:
         not_found = ProblemError(404, "No such session", f"there is no session {self._session[:40]!r}")

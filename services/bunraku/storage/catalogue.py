@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
+from bunraku.storage.postgres_url import split_tls_options
 from bunraku.storage.record import CatalogueEntry, Job, Quota, Share
 
 if TYPE_CHECKING:
-    from bunraku.storage.catalogue_sql import SqlCatalogue
+    from bunraku.storage.catalogue_sql import MotionKey, SqlCatalogue
 
 URL_SCHEMES = ("sqlite", "postgresql")
 
@@ -22,9 +24,13 @@ class Catalogue:
 
     def __init__(self, url: str) -> None:
         if url.split(":", 1)[0] not in URL_SCHEMES:
-            raise ValueError(f"invalid catalogue URL {url!r}, expected sqlite:///path or postgresql://host/name")
+            # without the URL, which may contain a password
+            raise ValueError("invalid catalogue URL, expected sqlite:///path or postgresql://host/name")
+        if url.startswith("postgresql:"):
+            split_tls_options(url)
         self._url = url
         self._open_task: asyncio.Task[SqlCatalogue] | None = None
+        self._incomplete_motions: frozenset[tuple[str, int]] = frozenset()
 
     async def open(self) -> SqlCatalogue:
         """Open the database if needed and return its tables.
@@ -43,24 +49,62 @@ class Catalogue:
                 await self._open_task.result().close()
 
     async def add_motion(self, entry: CatalogueEntry, quota: Quota | None = None) -> bool:
-        """Add a motion and return whether it is new; raise `QuotaExceeded`, with nothing added, beyond `quota`."""
-        return await (await self.open()).add_motion(entry, quota)
+        """Add a motion and return whether it is new; raise `QuotaExceeded`, with nothing added, beyond `quota`.
+
+        It replaces a motion of the same id that is incomplete.
+        """
+        tables = await self.open()
+        known = await tables.get_motion(entry.id) if self._incomplete_motions else None
+        if known is not None and self._is_incomplete(known):
+            await tables.remove_motion(entry.id)
+        return await tables.add_motion(entry, quota)
 
     async def check_quota(self, subject: str, quota: Quota) -> None:
         """Raise `QuotaExceeded` if `subject` cannot add even a small motion."""
         await (await self.open()).check_quota(subject, quota)
 
     async def get_motion(self, motion_id: str) -> CatalogueEntry | None:
-        """Return a motion, None if it does not exist."""
-        return await (await self.open()).get_motion(motion_id)
+        """Return a motion, None if it does not exist or is incomplete."""
+        entry = await (await self.open()).get_motion(motion_id)
+        return None if entry is None or self._is_incomplete(entry) else entry
 
     async def list_motions(self, limit: int, cursor: str | None = None) -> tuple[list[CatalogueEntry], str | None]:
-        """Return at most `limit` motions, newest first, and the next page's cursor; raise `InvalidCursor`."""
-        return await (await self.open()).list_motions(limit, cursor)
+        """Return at most `limit` motions, newest first, and the next page's cursor; raise `InvalidCursor`.
+
+        A page has fewer motions if some of them are incomplete.
+        """
+        entries, following = await (await self.open()).list_motions(limit, cursor)
+        return [entry for entry in entries if not self._is_incomplete(entry)], following
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""
         return await (await self.open()).remove_motion(motion_id)
+
+    async def list_motion_keys(self, limit: int, after: str = "") -> list[MotionKey]:
+        """Return at most `limit` motions with ids greater than `after`, by id, including incomplete ones."""
+        return await (await self.open()).list_motion_keys(limit, after)
+
+    def hide_incomplete_motions(self, keys: Collection[MotionKey]) -> None:
+        """Hide the motions whose objects are missing or truncated, and no others, on this replica.
+
+        Their rows stay: the objects may be on a file system that is not mounted. A row that is stored again has another
+        time of creation and is not hidden.
+        """
+        self._incomplete_motions = frozenset((key.id, key.created) for key in keys)
+
+    async def find_motions(self, ids: list[str]) -> set[str]:
+        """Return those of `ids` that are motions, including incomplete ones."""
+        return await (await self.open()).find_motions(ids)
+
+    async def find_jobs(self, ids: list[str]) -> set[str]:
+        """Return those of `ids` that are pending jobs."""
+        return await (await self.open()).find_jobs(ids)
+
+    async def restore_reserve(self) -> None:
+        """Reserve space for removals again, if there is room for it."""
+        reserve = (await self.open()).reserve
+        if reserve is not None:
+            await asyncio.to_thread(reserve.restore)
 
     async def add_job(self, job: Job, holder: str, held_until: int) -> None:
         """Add a job, held by the replica `holder` until clock time `held_until`; take over a job of the same id."""
@@ -78,9 +122,12 @@ class Catalogue:
         """Remove a job that is complete or given up."""
         await (await self.open()).jobs.remove(job_id)
 
-    async def add_share(self, share: Share) -> None:
-        """Add a viewer link and remove those that expired before it was created."""
-        await (await self.open()).shares.add(share)
+    async def add_share(self, share: Share, max_per_subject: int = 0) -> None:
+        """Add a viewer link and remove those that expired before it was created.
+
+        Raise `QuotaExceeded`, with nothing added, if its subject has `max_per_subject` links; 0 is unlimited.
+        """
+        await (await self.open()).shares.add(share, max_per_subject)
 
     async def get_share(self, share_id: str) -> Share | None:
         """Return a viewer link, None if it was revoked."""
@@ -93,6 +140,9 @@ class Catalogue:
     async def remove_share(self, share_id: str) -> bool:
         """Revoke a viewer link and return whether it existed."""
         return await (await self.open()).shares.remove(share_id)
+
+    def _is_incomplete(self, entry: CatalogueEntry) -> bool:
+        return (entry.id, entry.created) in self._incomplete_motions
 
     async def _open(self) -> SqlCatalogue:
         def import_class() -> type[SqlCatalogue]:

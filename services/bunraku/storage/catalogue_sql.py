@@ -7,21 +7,25 @@ import base64
 import binascii
 import json
 import sqlite3
-from collections.abc import Coroutine
-from typing import Any, TypeVar
+from collections.abc import Callable, Coroutine
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
-from sqlalchemy import Row, delete, func, select, text, tuple_
+from sqlalchemy import Column, Row, delete, event, func, select, text, tuple_
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnection
-from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine, create_async_engine
+from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 from bunraku.runtime.insufficient_storage import insufficient_storage
+from bunraku.runtime.problem import ProblemError
+from bunraku.storage.engine import create_engine
 from bunraku.storage.job_sql import SqlJobTable
 from bunraku.storage.migration import HEAD_REVISION, migrate, read_schema_version
 from bunraku.storage.record import CatalogueEntry, InvalidCursor, Quota, QuotaExceeded
 from bunraku.storage.share_sql import SqlShareTable
-from bunraku.storage.table import MOTIONS
+from bunraku.storage.space_reserve import SpaceReserve
+from bunraku.storage.table import JOBS, MOTIONS
 
 _QUOTA_LOCK_ID = 0x636F756E74
 """Key of the advisory lock in PostgreSQL under which motions are counted and added."""
@@ -29,16 +33,32 @@ _DRIVERS = {"sqlite": "sqlite+aiosqlite", "postgresql": "postgresql+asyncpg"}
 _CALLER_SQLSTATES = ("22", "23", "42", "53100")
 """Prefixes of SQLSTATEs that are not outages of PostgreSQL: errors of data, constraints and statements; full disk."""
 _DISK_FULL_SQLSTATE = "53100"
+_SQLITE_SPACE_ERRORS = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN)
+"""Primary result codes of SQLite when a disk or quota is full: besides FULL, those of a journal that cannot be made."""
+RESERVE_SUFFIX = "-reserve"
+"""Suffix of the file of reserved space beside an SQLite database."""
 
 Result = TypeVar("Result")
+
+
+class MotionKey(NamedTuple):
+    """A row of the motions, without its description."""
+
+    id: str
+    created: int
+    bytes: int
+    """Size of the object; 0 in rows from before quotas."""
 
 
 class SqlCatalogue:
     """Tables of motions, jobs and viewer links.
 
     Methods raise `BackendUnavailable` while the database is unavailable, on PostgreSQL also if it does not respond
-    within `BACKEND_TIMEOUT_S`, and work again when it recovers. If the disk of the database is full, methods that add
-    rows raise `ProblemError` (507).
+    within `BACKEND_TIMEOUT_S`, and work again when it recovers. If the disk of the database is full, methods that
+    change rows raise `ProblemError` (507); on SQLite, rows can still be removed, in space reserved for this purpose.
+
+    A row that was added or removed survives a power loss. PostgreSQL ensures it by default; SQLite needs `EXTRA`, which
+    also synchronises the folder after a transaction's journal was removed from it.
     """
 
     def __init__(self, url: str) -> None:
@@ -46,14 +66,21 @@ class SqlCatalogue:
         self._url = url
         self._postgres = url.startswith("postgresql")
         self._timeout = BackendTimeout("the catalogue")
-        pool_options = {
+        pool_options: dict[str, Any] = {
             "pool_pre_ping": True,
             "pool_timeout": BACKEND_TIMEOUT_S,
             "connect_args": {"timeout": BACKEND_TIMEOUT_S, "command_timeout": BACKEND_TIMEOUT_S},
         }
-        self._engine: AsyncEngine = create_async_engine(url, **(pool_options if self._postgres else {}))
-        self.jobs = SqlJobTable(self._engine, self._run_query)
-        self.shares = SqlShareTable(self._engine, self._run_query)
+        self._engine: AsyncEngine = create_engine(url, **(pool_options if self._postgres else {}))
+        self.reserve: SpaceReserve | None = None
+        """Reserved space on the disk of an SQLite database."""
+        if not self._postgres:
+            event.listen(self._engine.sync_engine, "connect", _make_commits_durable)
+            if self._engine.url.database:
+                database = Path(self._engine.url.database)
+                self.reserve = SpaceReserve(database.with_name(database.name + RESERVE_SUFFIX))
+        self.jobs = SqlJobTable(self._engine, self._run_query, self._run_removal)
+        self.shares = SqlShareTable(self._engine, self._run_query, self._run_removal)
 
     @classmethod
     async def open(cls, url: str) -> SqlCatalogue:
@@ -70,6 +97,8 @@ class SqlCatalogue:
         except BaseException:
             await catalogue.close()
             raise
+        if catalogue.reserve is not None:
+            await asyncio.to_thread(catalogue.reserve.restore)
         return catalogue
 
     async def close(self) -> None:
@@ -95,7 +124,19 @@ class SqlCatalogue:
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""
-        return _is_motion_id(motion_id) and await self._run_query(self._delete_motion(motion_id))
+        return _is_motion_id(motion_id) and await self._run_removal(lambda: self._delete_motion(motion_id))
+
+    async def list_motion_keys(self, limit: int, after: str = "") -> list[MotionKey]:
+        """Return at most `limit` rows with ids greater than `after`, by id."""
+        return await self._run_query(self._select_motion_keys(limit, after))
+
+    async def find_motions(self, ids: list[str]) -> set[str]:
+        """Return those of `ids` that are motions."""
+        return await self._run_query(self._select_existing(MOTIONS.c.id, ids))
+
+    async def find_jobs(self, ids: list[str]) -> set[str]:
+        """Return those of `ids` that are pending jobs."""
+        return await self._run_query(self._select_existing(JOBS.c.id, ids))
 
     async def _insert_motion(self, entry: CatalogueEntry, quota: Quota | None) -> bool:
         row = {
@@ -144,6 +185,20 @@ class SqlCatalogue:
         async with self._engine.begin() as connection:
             return (await connection.execute(delete(MOTIONS).where(MOTIONS.c.id == motion_id))).rowcount > 0
 
+    async def _select_motion_keys(self, limit: int, after: str) -> list[MotionKey]:
+        statement = (
+            select(MOTIONS.c.id, MOTIONS.c.created, MOTIONS.c.bytes)
+            .where(MOTIONS.c.id > after)
+            .order_by(MOTIONS.c.id)
+            .limit(limit)
+        )
+        async with self._engine.connect() as connection:
+            return [MotionKey(row.id, row.created, row.bytes or 0) for row in await connection.execute(statement)]
+
+    async def _select_existing(self, column: Column[str], ids: list[str]) -> set[str]:
+        async with self._engine.connect() as connection:
+            return set((await connection.execute(select(column).where(column.in_(ids)))).scalars())
+
     async def _schema_version(self) -> str | None:
         async with self._engine.connect() as connection:
             return await connection.run_sync(read_schema_version)
@@ -152,12 +207,47 @@ class SqlCatalogue:
         try:
             return await self._timeout.wait(query, BACKEND_TIMEOUT_S if self._postgres and limit_time else None)
         except (DBAPIError, NoConnection, OSError) as error:
-            if isinstance(error, DBAPIError) and _is_disk_full(error):
+            if isinstance(error, DBAPIError) and self._is_disk_full(error):
                 raise insufficient_storage("the catalogue") from error
             if isinstance(error, DBAPIError) and not _is_outage(error):
                 raise
             cause = error.orig if isinstance(error, DBAPIError) else error
             raise BackendUnavailable("the catalogue", str(cause) or type(cause).__name__) from error
+
+    def _is_disk_full(self, error: DBAPIError) -> bool:
+        if isinstance(error.orig, sqlite3.Error):
+            if getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL:
+                return True
+            # without a free inode, the journal cannot be created
+            return self.reserve is not None and _may_lack_space(error) and self.reserve.is_disk_full()
+        return str(getattr(error.orig, "sqlstate", "")) == _DISK_FULL_SQLSTATE
+
+    async def _run_removal(self, create_query: Callable[[], Coroutine[Any, Any, Result]]) -> Result:
+        """Run a query that removes rows. If there is no space for it, run it again in the reserved space."""
+        try:
+            return await self._run_query(create_query())
+        except (ProblemError, BackendUnavailable) as error:
+            if self.reserve is None or not _may_lack_space(error.__cause__):
+                raise
+            if not await asyncio.to_thread(self.reserve.release):
+                raise
+        try:
+            return await self._run_query(create_query())
+        finally:
+            # at once, before other writers use the space
+            await asyncio.to_thread(self.reserve.restore)
+
+
+def _make_commits_durable(connection: Any, _: Any) -> None:
+    cursor = connection.cursor()
+    cursor.execute("PRAGMA synchronous=EXTRA")
+    cursor.close()
+
+
+def _may_lack_space(error: BaseException | None) -> bool:
+    """Return whether an error of SQLite may come from a full disk or quota."""
+    code = getattr(getattr(error, "orig", None), "sqlite_errorcode", None)
+    return code is not None and code & 0xFF in _SQLITE_SPACE_ERRORS
 
 
 def _is_outage(error: DBAPIError) -> bool:
@@ -165,12 +255,6 @@ def _is_outage(error: DBAPIError) -> bool:
     if isinstance(error.orig, sqlite3.Error):
         return isinstance(error, OperationalError) and error.orig.sqlite_errorcode != sqlite3.SQLITE_FULL
     return not str(getattr(error.orig, "sqlstate", "")).startswith(_CALLER_SQLSTATES)
-
-
-def _is_disk_full(error: DBAPIError) -> bool:
-    if isinstance(error.orig, sqlite3.Error):
-        return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
-    return str(getattr(error.orig, "sqlstate", "")) == _DISK_FULL_SQLSTATE
 
 
 def _is_motion_id(text_id: str) -> bool:

@@ -12,15 +12,16 @@ from sqlalchemy import delete, select, update
 from sqlalchemy.ext.asyncio import AsyncEngine
 
 from bunraku.storage.record import Job
-from bunraku.storage.table import JOBS, QueryRunner
+from bunraku.storage.table import JOBS, QueryRunner, RemovalRunner
 
 
 class SqlJobTable:
     """Table of jobs; `Catalogue` documents the methods."""
 
-    def __init__(self, engine: AsyncEngine, run_query: QueryRunner) -> None:
+    def __init__(self, engine: AsyncEngine, run_query: QueryRunner, run_removal: RemovalRunner) -> None:
         self._engine = engine
         self._run_query = run_query
+        self._run_removal = run_removal
 
     async def add(self, job: Job, holder: str, held_until: int) -> None:
         """Add a job, or take over the one of the same id."""
@@ -36,7 +37,7 @@ class SqlJobTable:
 
     async def remove(self, job_id: str) -> None:
         """Remove a job."""
-        await self._run_query(self._remove(job_id))
+        await self._run_removal(lambda: self._remove(job_id))
 
     async def _add(self, job: Job, holder: str, held_until: int) -> None:
         values = {"details": json.dumps(job.details), "holder": holder, "until": held_until}

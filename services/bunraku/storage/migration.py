@@ -12,9 +12,10 @@ import threading
 from pathlib import Path
 
 from sqlalchemy import Connection, NullPool, inspect, text
-from sqlalchemy.ext.asyncio import AsyncConnection, create_async_engine
+from sqlalchemy.ext.asyncio import AsyncConnection
 
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendUnavailable
+from bunraku.storage.engine import create_engine
 
 HEAD_REVISION = "0003"
 """Schema version of this code."""
@@ -62,7 +63,7 @@ async def _migrate(url: str) -> None:
         if postgres
         else {"timeout": MIGRATION_TIMEOUT_S}
     )
-    engine = create_async_engine(url, poolclass=NullPool, connect_args=connect_args)
+    engine = create_engine(url, poolclass=NullPool, connect_args=connect_args)
     try:
         async with engine.connect() as connection:
             if postgres:

@@ -5,15 +5,22 @@ The store also holds the uploaded files and session logs of pending jobs, and no
 
 from __future__ import annotations
 
+import logging
 import re
 from collections import OrderedDict
+from collections.abc import AsyncIterator
 
 from bunraku.codec.container import StoredMotion, unpack_motion
 from bunraku.codec.errors import DamagedBlock
+from bunraku.storage.object_folder import StoredObject
 from bunraku.storage.object_storage import ObjectStorage
 
 MAX_CACHE_BYTES = 64 << 20
+OBJECT_FOLDERS = ("motions", "sources", "logs", "notes")
+_MOTION_SUFFIX = ".bunraku"
 _LOG_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,64}")
+
+_log = logging.getLogger(__name__)
 
 
 class MotionStore:
@@ -37,7 +44,7 @@ class MotionStore:
         await self._objects.put(_motion_path(motion_id), packed)
 
     async def get(self, motion_id: str) -> StoredMotion | None:
-        """Return a motion, None if it does not exist or is in an unsupported codec."""
+        """Return a motion, None if it does not exist, is damaged or is in an unsupported codec."""
         # never use a string as a path that cannot be an id
         if not (motion_id.isascii() and motion_id.isalnum()):
             return None
@@ -51,6 +58,9 @@ class MotionStore:
             stored = unpack_motion(motion_id, packed)
         except DamagedBlock:
             # a codec of an older release: the file can be uploaded again
+            return None
+        except (ValueError, LookupError, TypeError) as error:
+            _log.warning("The object of motion %s is damaged: %s; upload its file again", motion_id, error)
             return None
         self._cache_motion(stored)
         return stored
@@ -100,6 +110,18 @@ class MotionStore:
         if _LOG_NAME_PATTERN.fullmatch(name):
             await self._objects.delete(_log_path(name))
 
+    async def object_sizes(self, motion_ids: list[str]) -> list[int | None]:
+        """Return the sizes of the objects of motions in bytes, None for those that do not exist."""
+        return await self._objects.sizes([_motion_path(motion_id) for motion_id in motion_ids])
+
+    def list_objects(self, folder: str) -> AsyncIterator[list[StoredObject]]:
+        """Return the objects of one of `OBJECT_FOLDERS`, in chunks."""
+        return self._objects.list_chunks(folder)
+
+    async def remove_object(self, path: str) -> None:
+        """Remove an object that `list_objects` returned."""
+        await self._objects.delete(path)
+
     def _cache_motion(self, stored: StoredMotion) -> None:
         if stored.id not in self._cache:
             self._cached_bytes += stored.total_bytes
@@ -109,8 +131,13 @@ class MotionStore:
             self._cached_bytes -= dropped.total_bytes
 
 
+def object_id(path: str) -> str:
+    """Return the id of the motion or job, or the name of the log or note, whose object is at `path`."""
+    return path.rpartition("/")[2].removesuffix(_MOTION_SUFFIX)
+
+
 def _motion_path(motion_id: str) -> str:
-    return f"motions/{motion_id}.bunraku"
+    return f"motions/{motion_id}{_MOTION_SUFFIX}"
 
 
 def _log_path(name: str) -> str:

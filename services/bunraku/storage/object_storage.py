@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import asyncio
-import os
-from collections.abc import Awaitable
+from collections.abc import AsyncIterator, Awaitable, Callable
 from datetime import timedelta
+from pathlib import Path
 from typing import Any, TypeVar
 
 import obstore
 from obstore.exceptions import BaseError
-from obstore.store import LocalStore, ObjectStore, from_url
+from obstore.store import ObjectStore, from_url
 
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 from bunraku.runtime.insufficient_storage import insufficient_storage, is_disk_full
+from bunraku.storage.object_folder import LIST_CHUNK, ObjectFolder, StoredObject
 
 MIN_THROUGHPUT_BYTES_PER_S = 1 << 20
 """Throughput below which an object store counts as unavailable, in bytes per second."""
+CONCURRENT_HEAD_REQUESTS = 16
+"""Requests for the sizes of objects that are sent to a remote store at the same time."""
 
 Result = TypeVar("Result")
 
@@ -24,19 +27,19 @@ Result = TypeVar("Result")
 class ObjectStorage:
     """Objects at `file:///folder`, `s3://bucket/prefix` or another URL that obstore supports.
 
-    Methods raise `BackendUnavailable` if a remote store does not respond, denies access or has no such bucket. Endpoint
-    and keys of S3 come from the environment (`AWS_ENDPOINT_URL`, `AWS_ACCESS_KEY_ID` ...).
+    Methods raise `BackendUnavailable` if a store does not respond or denies access, a bucket does not exist, or a
+    folder is missing or read-only. Endpoint and keys of S3 come from the environment (`AWS_ENDPOINT_URL`,
+    `AWS_ACCESS_KEY_ID` ...).
     """
 
     def __init__(self, url: str) -> None:
         """Raise ValueError, or an error of obstore, for an invalid URL."""
         self._timeout = BackendTimeout("the library")
-        self._is_local = url.startswith("file://")
+        self._folder = ObjectFolder(Path(url.removeprefix("file://"))) if url.startswith("file://") else None
         self._store: ObjectStore
-        if self._is_local:
-            self._folder = url.removeprefix("file://")
-            self._store = LocalStore(self._folder, mkdir=True)
-        elif url.startswith("memory:"):
+        if self._folder is not None:
+            return
+        if url.startswith("memory:"):
             self._store = from_url(url)
         else:
             # http:// is used only if the endpoint's URL has it
@@ -49,15 +52,18 @@ class ObjectStorage:
 
         Raise `ProblemError` (507) if there is no space; the previous object of this path then stays.
         """
+        if self._folder is not None:
+            await self._run_in_folder(lambda folder: folder.write(path, data))
+            return
         try:
             await self._run_request(obstore.put_async(self._store, path, data), len(data))
         except FileNotFoundError as error:
-            if self._is_local:
-                raise
             raise BackendUnavailable("the library", _error_detail(error)) from error
 
     async def get(self, path: str) -> bytes | None:
         """Return an object, None if it does not exist."""
+        if self._folder is not None:
+            return await self._run_in_folder(lambda folder: folder.read(path))
         try:
             response = await self._run_request(obstore.get_async(self._store, path))
             return bytes(await self._run_request(response.bytes_async(), response.meta["size"]))
@@ -66,27 +72,64 @@ class ObjectStorage:
 
     async def delete(self, path: str) -> None:
         """Remove an object if it exists."""
+        if self._folder is not None:
+            await self._run_in_folder(lambda folder: folder.remove(path))
+            return
         try:
             await self._run_request(obstore.delete_async(self._store, path))
         except FileNotFoundError:
             return
 
+    async def sizes(self, paths: list[str]) -> list[int | None]:
+        """Return the sizes of objects in bytes, None for those that do not exist."""
+        if self._folder is not None:
+            return await self._run_in_folder(lambda folder: folder.sizes(paths))
+        limit = asyncio.Semaphore(CONCURRENT_HEAD_REQUESTS)
+
+        async def get_size(path: str) -> int | None:
+            async with limit:
+                try:
+                    return (await self._run_request(obstore.head_async(self._store, path)))["size"]
+                except FileNotFoundError:
+                    return None
+
+        return list(await asyncio.gather(*map(get_size, paths)))
+
+    async def list_chunks(self, prefix: str) -> AsyncIterator[list[StoredObject]]:
+        """Yield the objects of the folder `prefix` in chunks; in a local store also the files of unfinished writes."""
+        if self._folder is not None:
+            local = self._folder.list_chunks(prefix)
+            while (objects := await self._run_in_folder(lambda _: next(local, None))) is not None:
+                yield objects
+            return
+        stream = obstore.list(self._store, prefix, chunk_size=LIST_CHUNK)
+
+        async def next_chunk() -> list[StoredObject]:
+            return [
+                StoredObject(item["path"], item["size"], item["last_modified"].timestamp())
+                for item in await anext(stream, ())
+            ]
+
+        while remote := await self._run_request(next_chunk()):
+            yield remote
+
     async def check(self) -> None:
         """Raise `BackendUnavailable` if the store cannot be used now."""
-        if self._is_local:
-            if not await asyncio.to_thread(os.access, self._folder, os.R_OK | os.W_OK | os.X_OK):
-                raise BackendUnavailable("the library", f"the folder {self._folder} does not exist or is not writable")
-        else:
+        if self._folder is None:
             await self.get("readyz")
+        elif not await asyncio.to_thread(self._folder.is_usable):
+            raise BackendUnavailable("the library", f"{self._folder} does not exist or is not writable")
+
+    async def _run_in_folder(self, operation: Callable[[ObjectFolder], Result]) -> Result:
+        assert self._folder is not None
+        try:
+            return await asyncio.to_thread(operation, self._folder)
+        except OSError as error:
+            if is_disk_full(error):
+                raise insufficient_storage("the library") from error
+            raise BackendUnavailable("the library", str(error)) from error
 
     async def _run_request(self, request: Awaitable[Result], transfer_bytes: int = 0) -> Result:
-        if self._is_local:
-            try:
-                return await request
-            except BaseError as error:
-                if is_disk_full(error):
-                    raise insufficient_storage("the library") from error
-                raise
         try:
             return await self._timeout.wait(request, BACKEND_TIMEOUT_S + transfer_bytes / MIN_THROUGHPUT_BYTES_PER_S)
         except BaseError as error:

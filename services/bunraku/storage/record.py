@@ -11,7 +11,7 @@ class InvalidCursor(ValueError):
 
 
 class QuotaExceeded(Exception):
-    """A motion that does not fit into a quota; the message names the limit."""
+    """A motion or link that does not fit into a quota; the message names the limit."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,23 +5,27 @@ from __future__ import annotations
 import builtins
 from typing import Any
 
-from sqlalchemy import Row, delete, select
+from sqlalchemy import Row, delete, func, select, text
 from sqlalchemy.ext.asyncio import AsyncEngine
 
-from bunraku.storage.record import Share
-from bunraku.storage.table import SHARES, QueryRunner
+from bunraku.storage.record import QuotaExceeded, Share
+from bunraku.storage.table import SHARES, QueryRunner, RemovalRunner
+
+_QUOTA_LOCK_ID = 0x6C696E6B73
+"""Key of the advisory lock in PostgreSQL under which links are counted and added."""
 
 
 class SqlShareTable:
     """Table of viewer links; `Catalogue` documents the methods."""
 
-    def __init__(self, engine: AsyncEngine, run_query: QueryRunner) -> None:
+    def __init__(self, engine: AsyncEngine, run_query: QueryRunner, run_removal: RemovalRunner) -> None:
         self._engine = engine
         self._run_query = run_query
+        self._run_removal = run_removal
 
-    async def add(self, share: Share) -> None:
-        """Add a link and remove expired ones."""
-        await self._run_query(self._add(share))
+    async def add(self, share: Share, max_per_subject: int = 0) -> None:
+        """Add a link and remove expired ones; raise `QuotaExceeded` beyond `max_per_subject` links of its subject."""
+        await self._run_query(self._add(share, max_per_subject))
 
     async def get(self, share_id: str) -> Share | None:
         """Return a link, None if it does not exist."""
@@ -37,13 +41,21 @@ class SqlShareTable:
 
     async def remove(self, share_id: str) -> bool:
         """Remove a link and return whether it existed."""
-        return await self._run_query(self._remove(share_id))
+        return await self._run_removal(lambda: self._remove(share_id))
 
-    async def _add(self, share: Share) -> None:
+    async def _add(self, share: Share, max_per_subject: int) -> None:
         row = {column.name: getattr(share, column.name) for column in SHARES.columns}
         async with self._engine.begin() as connection:
-            await connection.execute(delete(SHARES).where(SHARES.c.expires < share.created))
+            if max_per_subject and self._engine.dialect.name == "postgresql":
+                # SQLite needs no lock: it admits one writer from the first change on
+                await connection.execute(text(f"SELECT pg_advisory_xact_lock({_QUOTA_LOCK_ID})"))
+            await connection.execute(delete(SHARES).where(SHARES.c.expires <= share.created))
             await connection.execute(SHARES.insert().values(row))
+            if max_per_subject:
+                # counts the new link; raising rolls the insert back
+                counted = select(func.count()).select_from(SHARES).where(SHARES.c.subject == share.subject)
+                if (await connection.execute(counted)).scalar_one() > max_per_subject:
+                    raise QuotaExceeded(f"you may have at most {max_per_subject} links that have not expired")
 
     async def _select(self, statement: Any) -> builtins.list[Share]:
         async with self._engine.connect() as connection:

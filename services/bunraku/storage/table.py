@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Coroutine
+from collections.abc import Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
 from sqlalchemy import BigInteger, Column, Integer, MetaData, String, Table, Text
@@ -46,3 +46,10 @@ class QueryRunner(Protocol):
 
     def __call__(self, query: Coroutine[Any, Any, Result]) -> Coroutine[Any, Any, Result]:
         """Return the result; raise `BackendUnavailable`, or `ProblemError` (507) if the database's disk is full."""
+
+
+class RemovalRunner(Protocol):
+    """Function that runs a query which removes rows, if the disk is full in reserved space."""
+
+    def __call__(self, create_query: Callable[[], Coroutine[Any, Any, Result]]) -> Coroutine[Any, Any, Result]:
+        """Return the result; `create_query` may be called twice. Raise as `QueryRunner` does."""

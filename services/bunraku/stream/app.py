@@ -51,7 +51,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         metrics.register_metrics(context.metrics, stream.counters, sessions)
         yield
 
-    app = FastAPI(title="Bunraku stream", lifespan=lifespan)
+    app = FastAPI(title="Bunraku stream", lifespan=lifespan, openapi_url=None)
     app.state.multicast_sender = stream.sender
     problem_details.install_problem_handlers(app)
 

@@ -39,6 +39,8 @@ BULK_QUEUE_US = 200_000
 """Additional send queue allowed for non-live data on a constrained link, in microseconds."""
 WRITE_BATCH_BYTES = 16_384
 """Approximate size of one write of blocks."""
+EDIT_INTERVAL_US = 50_000
+"""Minimum time between two edits of a viewer's own timeline; those in between are combined, microseconds."""
 HIGH_RTT_CHECK_INTERVAL_US = 250_000
 """Interval between reassessments of an unchecked high-RTT link, microseconds."""
 LOW_RTT_CHECK_INTERVAL_US = 4_000_000
@@ -64,8 +66,8 @@ class ViewerConnection:
     """Sending side of one viewer. Everything is queued until `open` is called."""
 
     __slots__ = (
-        "_context", "_feed", "_flow", "_has_own_timeline", "_heartbeat", "_next_flow_check_at", "_overlay_waited_at",
-        "_queue", "_quiet_period", "_sync", "_timer", "connection", "group",
+        "_context", "_feed", "_flow", "_has_own_timeline", "_heartbeat", "_next_edit_at", "_next_flow_check_at",
+        "_overlay_waited_at", "_pending_edit", "_queue", "_quiet_period", "_sync", "_timer", "connection", "group",
     )  # fmt: skip
 
     def __init__(self, context: StreamContext, options: ViewerOptions | None = None) -> None:
@@ -81,6 +83,8 @@ class ViewerConnection:
         self._quiet_period = QuietPeriod()
         self._flow = _NO_FLOW_CONTROL
         self._next_flow_check_at = 0
+        self._pending_edit: Edit | None = None
+        self._next_edit_at = 0
         self._timer: asyncio.TimerHandle | None = None
         self.group: ViewerGroup | None = None
         self.connection: WebSocketConnection = CLOSED_CONNECTION
@@ -163,7 +167,8 @@ class ViewerConnection:
             if delivery.process_report(received, now) or now >= self._next_flow_check_at:
                 self._context.scheduler.schedule(self, 0)
         elif isinstance(received, Edit) and self._has_own_timeline:
-            self._edit(received)
+            self._pending_edit = received if self._pending_edit is None else _combine(self._pending_edit, received)
+            self._apply_edit(self._context.clock())
 
     def on_pong(self, payload: bytes) -> bool:
         """Handle the answer to a probe."""
@@ -192,6 +197,7 @@ class ViewerConnection:
         """Check the heartbeat, send due data, and schedule the next tick."""
         now = self._context.clock()
         if self._heartbeat.check(self.connection, now):
+            self._apply_edit(now)
             self._send_due(now, check_flow=True)
         else:
             self._context.counters.dropped[(TIMEOUT_REASON,)] += 1
@@ -353,6 +359,8 @@ class ViewerConnection:
     def _next_tick(self) -> int:
         """Return the clock time of the next tick: for a block, the heartbeat or a check of the link."""
         due = self._heartbeat.next_check(self.connection)
+        if self._pending_edit is not None:
+            due = min(due, self._next_edit_at)
         if not self.connection.is_writable:
             return due
         if self._sync.group is not None:
@@ -387,9 +395,23 @@ class ViewerConnection:
         self._context.scheduler.cancel(self)
         self._cancel_timer()
 
-    def _edit(self, edit: Edit) -> None:
-        """Edit the viewer's own timeline."""
-        state, delivery, now = self._feed.state, self._feed.delivery, self._context.clock()
-        if state is not None and delivery is not None:
-            state = timeline.edit(state, now, playing=edit.playing, position=edit.position, loop=edit.loop)
-            self.set_timeline(state, delivery.motion)
+    def _apply_edit(self, now: int) -> None:
+        """Edit the viewer's own timeline, or schedule that if it was edited just now."""
+        edit, state, delivery = self._pending_edit, self._feed.state, self._feed.delivery
+        if edit is None or state is None or delivery is None:
+            return
+        if now < self._next_edit_at:
+            self._context.scheduler.schedule(self, self._next_edit_at)
+            return
+        self._pending_edit, self._next_edit_at = None, now + EDIT_INTERVAL_US
+        state = timeline.edit(state, now, playing=edit.playing, position=edit.position, loop=edit.loop)
+        self.set_timeline(state, delivery.motion)
+
+
+def _combine(earlier: Edit, later: Edit) -> Edit:
+    """Return an edit with the effect of both."""
+    return Edit(
+        playing=earlier.playing if later.playing is None else later.playing,
+        position=earlier.position if later.position is None else later.position,
+        loop=earlier.loop if later.loop is None else later.loop,
+    )

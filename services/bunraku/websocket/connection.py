@@ -36,17 +36,22 @@ SEND_BUFFER_BYTES = 32 << 10
 the overhead of its buffers. Data in this buffer cannot be replaced when newer data is to be sent."""
 
 
-class FrameLimit(NamedTuple):
-    """Limit on the frames and reads of one connection: so many per second, and so many at once.
+FRAMES_PER_TURN = 16
+"""Frames of one connection that are handled before the events of other connections."""
 
-    A client above it is disconnected. Pongs that answer a Ping of this side do not count.
+
+class FrameLimit(NamedTuple):
+    """Limit on the frames of one connection: so many per second, and so many at once.
+
+    A client above it is disconnected. A read that completes no frame counts as one. Pongs that answer a Ping of this
+    side do not count.
     """
 
     rate: float
     burst: float
 
 
-VIEWER_FRAMES = FrameLimit(60.0, 240.0)
+VIEWER_FRAMES = FrameLimit(40.0, 120.0)
 """Limit of a viewer, which sends some messages per second."""
 
 
@@ -170,16 +175,25 @@ class WebSocketConnection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         self.last_received_at = self._clock()
-        frames, ping = self._parser.parse(data), None
+        self._receive(data)
+
+    def _receive(self, data: bytes) -> None:
+        """Handle some frames of the unparsed data and `data`, and the rest after the events of other connections."""
+        frames, handled, ping = self._parser.parse(data), 0, None
         try:
-            # tiny segments cost as much as frames
-            self._count_frame()
             for opcode, payload in frames:
                 self._count_frame()
+                handled += 1
                 if opcode == Opcode.PING:
                     ping = payload
                 else:
                     self._handle_frame(opcode, payload)
+                if handled == FRAMES_PER_TURN:
+                    self._transport.pause_reading()
+                    asyncio.get_running_loop().call_soon(self._continue_receiving)
+                    break
+            if not handled:
+                self._count_frame()
         except FrameError as error:
             title = "Too large" if error.code == MESSAGE_TOO_BIG else "Broken frame"
             self._reject(CloseConnection(error.code, title, error.detail))
@@ -192,6 +206,12 @@ class WebSocketConnection(asyncio.Protocol):
         if ping is not None and self.is_writable and self._close_timer is None:
             # one Pong for the most recent Ping (RFC 6455, section 5.5.3)
             self.write(encode_frame(ping, Opcode.PONG))
+
+    def _continue_receiving(self) -> None:
+        if self._transport.get_protocol() is self and not self._transport.is_closing():
+            self._transport.resume_reading()
+            if self._parser.has_unparsed_data:
+                self._receive(b"")
 
     def _count_frame(self) -> None:
         if not self._frames.take(self.last_received_at * 1e-6):

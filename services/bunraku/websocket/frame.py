@@ -92,11 +92,17 @@ class ClientFrameParser:
         self._fragments: bytes | None = None
         self._message_opcode = Opcode.BINARY
 
+    @property
+    def has_unparsed_data(self) -> bool:
+        """True if data waits: the beginning of a frame, or frames after a caller stopped."""
+        return bool(self._buffer)
+
     def parse(self, data: bytes) -> Generator[tuple[Opcode, bytes], None, None]:
         """Yield the opcode and payload of each message and control frame that `data` completes.
 
-        A caller that stops before the end closes the generator; the next call continues there. Raises `FrameError`;
-        the parser must not be used after that.
+        A fragment that completes no message is an empty CONTINUATION, so that a caller can count frames. A caller that
+        stops before the end closes the generator; the next call continues there. Raises `FrameError`; the parser must
+        not be used after that.
         """
         if self._buffer:
             data = self._buffer + data
@@ -106,8 +112,8 @@ class ClientFrameParser:
                 at = end
                 if opcode >= Opcode.CLOSE:
                     yield Opcode(opcode), payload
-                elif (message := self._assemble_message(opcode, payload, final=final)) is not None:
-                    yield message
+                else:
+                    yield self._assemble_message(opcode, payload, final=final)
         finally:
             self._buffer = data[at:]
 
@@ -139,8 +145,8 @@ class ClientFrameParser:
             at = body + 4 + size
             yield at, opcode, payload, bool(head & 0x80)
 
-    def _assemble_message(self, opcode: int, payload: bytes, *, final: bool) -> tuple[Opcode, bytes] | None:
-        """Add a fragment. Return the message if this was its last one."""
+    def _assemble_message(self, opcode: int, payload: bytes, *, final: bool) -> tuple[Opcode, bytes]:
+        """Add a fragment. Return the message if this was its last one, else an empty CONTINUATION."""
         if (opcode == Opcode.CONTINUATION) != (self._fragments is not None):
             raise FrameError(PROTOCOL_ERROR, "a continuation frame is missing or follows no message")
         if self._fragments is None:
@@ -150,7 +156,7 @@ class ClientFrameParser:
         if len(self._fragments) > self._max_message_bytes:
             raise self._message_too_big()
         if not final:
-            return None
+            return Opcode.CONTINUATION, b""
         message, self._fragments = self._fragments, None
         return self._message_opcode, message
 

@@ -25,6 +25,7 @@ HANDSHAKE_TIMEOUT_S = 30.0
 """Time from the request to the response of a handshake, of which most is for backends."""
 REJECTED_FRAMES = FrameLimit(1.0, 16.0)
 """Limit of a rejected client, of which only a Close frame is expected."""
+_BAD_REQUEST = b"HTTP/1.1 400 Bad Request\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
 
 
 class _DetachedTransport(asyncio.Transport):
@@ -57,9 +58,15 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         self.transport.pause_reading()
         self._handshake_timer = self.loop.call_later(HANDSHAKE_TIMEOUT_S, self.transport.abort)
 
+    def data_received(self, data: bytes) -> None:
+        super().data_received(data)
+        if not self.handshake_initiated:
+            # the only data is the request, which the parser has rejected without an answer
+            self.transport.write(_BAD_REQUEST)
+            self.transport.close()
+
     def handle_parser_exception(self) -> None:
-        # only the handshake is parsed here
-        self.transport.abort()
+        pass
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._cancel_timeout()

@@ -2,6 +2,7 @@
 import { pageAccess } from "../client/access";
 import { shareSession } from "../client/api";
 import { ProblemError } from "../client/problem";
+import { formatTime } from "../i18n/number-format";
 import { translate } from "../i18n/translator";
 
 /**
@@ -14,8 +15,9 @@ export async function copyShareLink(session: string | null, notify: (message: st
   let message = translate("Link copied");
   if (pageAccess.hasToken && session !== null) {
     try {
-      url.href = new URL(await shareSession(session), location.href).href;
-      message = translate("Link copied. Anyone who has it can watch for one week");
+      const { link, expires } = await shareSession(session);
+      url.href = new URL(link, location.href).href;
+      message = translate("Link copied. Anyone who has it can watch until {time}", { time: formatTime(expires) });
     } catch (error) {
       if (!(error instanceof ProblemError)) throw error;
       notify(translate("{title}: {detail}", error));

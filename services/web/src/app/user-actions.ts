@@ -5,7 +5,6 @@ import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
-import { isolateBidi } from "../ui/format";
 import { isAvatarFile } from "../ui/library/avatar-chooser";
 import { showProblem, uploadAll } from "../ui/library/upload";
 import type { Page, UserActions } from "../ui/page";
@@ -61,7 +60,7 @@ export function createUserActions(app: AppParts): UserActions {
     picture: () => savePicture(app),
     download: (...request) => void app.exporter.downloadMotion(...request),
     remove: (motion) => {
-      if (!confirm(translate('Remove "{name}" from the library?', { name: isolateBidi(motion.name) }))) return;
+      if (!confirm(translate('Remove "{name}" from the library?', { name: motion.name }))) return;
       app.library.remove(motion.id).catch((error: unknown) => showProblem(app.page.library, motion.name, error));
     },
     toggle: (limb) => app.limbController.toggleClaim(limb),

@@ -115,9 +115,15 @@ export function recordSession(session: string, recording: Recording = {}): Promi
   return requestJson("POST", `/v1/sessions/${encodeURIComponent(session)}/recordings`, recording) as Promise<Motion>;
 }
 
-/** Share a session; return the link for viewers, relative to the page's URL. */
-export async function shareSession(session: string): Promise<string> {
-  return ((await requestJson("POST", "/v1/shares", { session })) as { link: string }).link;
+/** Link for viewers, relative to the page's URL, and the time at which it expires (RFC 3339). */
+export interface ShareLink {
+  link: string;
+  expires: string;
+}
+
+/** Share a session. The link lasts for a week, but no longer than the token of a puppeteer. */
+export async function shareSession(session: string): Promise<ShareLink> {
+  return (await requestJson("POST", "/v1/shares", { session })) as ShareLink;
 }
 
 /** Current stage of an upload, on the way or on the server, and the share of the stage that is done, 0..1. */

@@ -46,8 +46,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   Home: "ホーム",
   "Share link": "リンクを共有",
   "Link copied": "リンクをコピーしました",
-  "Link copied. Anyone who has it can watch for one week":
-    "リンクをコピーしました。1週間、リンクを知っている人が観られます",
+  "Link copied. Anyone who has it can watch until {time}":
+    "リンクをコピーしました。{time}まで、リンクを知っている人が観られます",
   "Copy this link: {link}": "このリンクをコピーしてください：{link}",
   "Keys and gamepad": "キーとゲームパッド",
   "Light theme": "明るいテーマ",

@@ -1,4 +1,4 @@
-/** Numbers in the page's language. Pure. */
+/** Numbers and times in the page's language. Pure. */
 import { pageLanguage } from "./translator";
 
 /** Format a number with exactly this many decimal places. */
@@ -14,4 +14,10 @@ export function formatDecimal(value: number, digits: number): string {
 /** Format a fraction, 0 to 1, as whole percent. */
 export function formatPercent(fraction: number): string {
   return new Intl.NumberFormat(pageLanguage(), { style: "percent" }).format(fraction);
+}
+
+/** Format a time (RFC 3339) as day and minute in the user's time zone. */
+export function formatTime(time: string): string {
+  const options = { month: "long", day: "numeric", hour: "numeric", minute: "2-digit" } as const;
+  return new Intl.DateTimeFormat(pageLanguage(), options).format(new Date(time));
 }

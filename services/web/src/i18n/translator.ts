@@ -3,6 +3,7 @@
  * so modules must not translate while they load: tables hold English texts, which are translated where they are shown.
  * The page has one translator, each embedded element has its own. Pure.
  */
+import { isolateBidi } from "./bidi";
 import type { JAPANESE_PAGE_MESSAGES } from "./japanese";
 
 export type Language = "en" | "ja";
@@ -46,11 +47,11 @@ export class Translator {
     [this.#language, this.#messages] = [language, messages];
   }
 
-  /** Translate a text and fill in its values. */
+  /** Translate a text and fill in its values, which may be names in another direction of writing. */
   readonly translate = <Text extends MessageKey>(
     english: Text,
     ...values: [PlaceholderNames<Text>] extends [never] ? [] : [Record<PlaceholderNames<Text>, string | number>]
-  ): string => interpolate(this.#messages.page[english] ?? english, values[0] ?? {}).join("");
+  ): string => interpolate(this.#messages.page[english] ?? english, isolateValues(values[0] ?? {})).join("");
 
   /** Translate a text whose values are not strings, such as elements; return its parts in order. */
   readonly translateToParts = <Text extends MessageKey, Values extends Record<PlaceholderNames<Text>, unknown>>(
@@ -73,7 +74,7 @@ export class Translator {
       if (values)
         return interpolate(
           translated,
-          Object.fromEntries(Object.entries(values).map(([name, value]) => [name, server[value] ?? value])),
+          isolateValues(Object.fromEntries(Object.entries(values).map(([name, one]) => [name, server[one] ?? one]))),
         ).join("");
     }
     return text;
@@ -91,6 +92,12 @@ export const setPageLanguage: Translator["setLanguage"] = (language, messages) =
 
 function interpolate<Value>(text: string, values: Readonly<Record<string, Value>>): (string | Value)[] {
   return text.split(/\{(\w+)\}/).map((part, i) => (i % 2 === 0 ? part : values[part]));
+}
+
+function isolateValues(values: Readonly<Record<string, string | number>>): Record<string, string | number> {
+  return Object.fromEntries(
+    Object.entries(values).map(([name, value]) => [name, typeof value === "string" ? isolateBidi(value) : value]),
+  );
 }
 
 /** Return a pattern that matches a text with its placeholders filled in, with one named group per placeholder. */

@@ -4,14 +4,6 @@ import type { UploadProgress } from "../client/api";
 import { formatDecimal } from "../i18n/number-format";
 import { joinList, translate } from "../i18n/translator";
 
-/** Unicode controls that change the direction of text. */
-const BIDI_CONTROLS = /[\u202a-\u202e\u2066-\u2069]/;
-
-/** Isolate a user's text, so that direction controls in it do not affect the surrounding text. */
-export function isolateBidi(name: string): string {
-  return BIDI_CONTROLS.test(name) ? `\u2068${name}\u2069` : name;
-}
-
 /** Format seconds as m:ss, or h:mm:ss. */
 export function formatDuration(seconds: number): string {
   const whole = Math.max(0, Math.floor(Number.isFinite(seconds) ? seconds : 0));

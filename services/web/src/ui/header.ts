@@ -1,9 +1,10 @@
 /** Page header: wordmark, motion name, viewers, and the buttons for sharing, keys, language and theme. */
+import { isolateBidi } from "../i18n/bidi";
 import { formatDecimal } from "../i18n/number-format";
 import { joinList, pageLanguage, translate } from "../i18n/translator";
 import type { Theme } from "../stage/scenery/look";
 import { element, setText } from "./dom";
-import { initialOf, isolateBidi } from "./format";
+import { initialOf } from "./format";
 import { icon } from "./icon";
 import type { Presence } from "./limb-state";
 
@@ -25,7 +26,7 @@ export function createHeader(
   root: HTMLElement,
   actions: { share(): void; keys(): void; language(): void; theme(): void },
 ): Header {
-  const motionName = element("span", { class: "brand-piece" });
+  const motionName = element("span", { class: "brand-piece", dir: "auto" });
   const brand = element(
     "a",
     { class: "brand", href: location.pathname, title: translate("Home") },

@@ -1,7 +1,12 @@
 import { afterEach, expect, test, vi } from "vitest";
 import { copyShareLink } from "../../src/app/share-link";
+import { pageAccess } from "../../src/client/access";
+import { formatTime } from "../../src/i18n/number-format";
 
-afterEach(() => void vi.unstubAllGlobals());
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.restoreAllMocks();
+});
 
 /** Copy a link from a page at `href`; return the texts copied to the clipboard and the messages shown. */
 async function copyFrom(
@@ -32,4 +37,15 @@ test("link is shown if the clipboard is not available", async () => {
   const { copied, messages } = await copyFrom("http://stage.example/", "s", false);
   expect(copied).toEqual([]);
   expect(messages).toEqual(["Copy this link: http://stage.example/?session=s"]);
+});
+
+test("link with a token says until when it can be used", async () => {
+  const expires = "2026-12-24T18:30:00Z";
+  const answer = { link: "/?session=s#share=t", expires };
+  vi.stubGlobal("fetch", () => Promise.resolve(new Response(JSON.stringify(answer), { status: 201 })));
+  vi.spyOn(pageAccess, "hasToken", "get").mockReturnValue(true);
+  const { copied, messages } = await copyFrom("http://stage.example/", "s", true);
+  expect(copied).toEqual(["http://stage.example/?session=s#share=t"]);
+  expect(messages).toEqual([`Link copied. Anyone who has it can watch until ${formatTime(expires)}`]);
+  expect(formatTime(expires)).toMatch(/^December 2[345]\D+\d+:\d0/);
 });

@@ -56,6 +56,24 @@ describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture)
     await secondPage.locator(".notice").getByText("Link revoked").waitFor();
   });
 
+  test("the API reference needs no token, no other site and no exception from its policy", async () => {
+    const errors: string[] = [];
+    const addresses: string[] = [];
+    const page = await fixture.open("v1/docs", {
+      before: async (opened) => {
+        opened.on("console", (message) => message.type() === "error" && errors.push(message.text()));
+        opened.on("request", (request) => addresses.push(request.url()));
+      },
+    });
+    const section = page.locator("#post-v1-shares");
+    await section.getByText("Role control").waitFor();
+    expect(await section.locator("pre").first().innerText()).toContain("seconds?: integer");
+    expect(await page.locator("main section").count()).toBeGreaterThan(20);
+    expect(errors).toEqual([]);
+    const isOwn = (address: string): boolean => address.startsWith("data:") || address.startsWith(fixture.url);
+    expect(addresses.filter((address) => !isOwn(address))).toEqual([]);
+  });
+
   test("a link to a motion plays it on a private timeline", async () => {
     const { items } = (await (await requestAsAdmin("GET", "/v1/motions")).json()) as { items: { id: string }[] };
     const { link } = (await (await requestAsAdmin("POST", "/v1/shares", { motion: items[0]?.id })).json()) as {

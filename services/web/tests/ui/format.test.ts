@@ -6,7 +6,6 @@ import {
   formatIngestStage,
   formatUploadProgress,
   initialOf,
-  isolateBidi,
   motionNameFromFile,
 } from "../../src/ui/format";
 
@@ -14,15 +13,6 @@ describe("formats", () => {
   test("durations", () => {
     expect([0, 9.99, 87, 204, 3671].map(formatDuration)).toEqual(["0:00", "0:09", "1:27", "3:24", "1:01:11"]);
     expect([-1, Number.NaN, Infinity].map(formatDuration)).toEqual(["0:00", "0:00", "0:00"]);
-  });
-
-  test("names with direction controls are isolated", () => {
-    expect(["Sanbasō", "<b>", "\u202egnp.", "\u2067a\u2069"].map(isolateBidi)).toEqual([
-      "Sanbasō",
-      "<b>",
-      "\u2068\u202egnp.\u2069",
-      "\u2068\u2067a\u2069\u2069",
-    ]);
   });
 
   test("bytes", () => {

@@ -53,7 +53,7 @@ export function createAvatarChooser(actions: AvatarActions): AvatarChooser {
   const radio = (avatar: boolean) =>
     element("input", { type: "radio", name: "dance-as", onChange: () => actions.danceAs(avatar) });
   const [puppet, avatar] = [radio(false), radio(true)];
-  const avatarName = element("span", { class: "dance-as-name" });
+  const avatarName = element("span", { class: "dance-as-name", dir: "auto" });
   const remove = element(
     "button",
     { class: "round-button dance-as-remove", type: "button", onClick: () => actions.removeAvatar() },

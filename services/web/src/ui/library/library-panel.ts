@@ -138,7 +138,7 @@ function createMotionRow(
   const text = element(
     "span",
     { class: "motion-text" },
-    element("b", {}, motion.name),
+    element("b", { dir: "auto" }, motion.name),
     element("small", {}, motion.detail),
   );
   choose.append(glyph, text, element("span", { class: "motion-length" }, formatDuration(motion.seconds)));
@@ -191,7 +191,7 @@ function createProgressRow(
   const row = element(
     "div",
     { class: "upload" },
-    element("div", { class: "upload-row" }, element("span", { class: "upload-name" }, name), percentage),
+    element("div", { class: "upload-row" }, element("span", { class: "upload-name", dir: "auto" }, name), percentage),
     bar,
   );
   row.append(element("div", { class: "upload-row" }, state, stop));

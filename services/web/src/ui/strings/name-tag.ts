@@ -67,7 +67,7 @@ export function createNameTags(
     for (const tag of tags) tag.content = "";
   }).observe(layer);
   const tags = Array.from({ length: MAX_LIMBS }, (_, i) => {
-    const [name, letter, limb] = [element("b"), element("i"), element("span")];
+    const [name, letter, limb] = [element("b", { dir: "auto" }), element("i"), element("span")];
     const button = element(
       "button",
       { class: "tag-ask", type: "button", tabindex: -1, hidden: true, onClick: () => onRequest(i) },

@@ -111,7 +111,7 @@ export function createStringsPanel(
     return { limb, row, render };
   });
   const discs = LIMB_ORDER.map((limb) => {
-    const name = element("span", { hidden: true });
+    const name = element("span", { hidden: true, dir: "auto" });
     const disc = element(
       "button",
       { type: "button", onClick: () => actions.toggle(limbOf(limb)), ...focusEvents(limb) },
