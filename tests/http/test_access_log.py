@@ -1,14 +1,15 @@
 from __future__ import annotations
 
+import contextlib
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 import httpx2
 import pytest
 from prometheus_client import generate_latest
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route
 from starlette.types import Receive, Scope, Send
@@ -33,6 +34,17 @@ class FakeClock:
 async def answer(request: Request) -> Response:
     request.scope[ROUTE_SCOPE_KEY] = "/v1/things/{thing}"
     return PlainTextResponse(request_id.current(), 418 if request.method == "POST" else 200)
+
+
+async def read_body(request: Request) -> Response:
+    await request.body()
+    return PlainTextResponse("read")
+
+
+async def read_body_and_answer(request: Request) -> Response:
+    with contextlib.suppress(ClientDisconnect):
+        await request.body()
+    return PlainTextResponse("unread", 400)
 
 
 async def fail(_: Request) -> Response:
@@ -99,6 +111,24 @@ async def test_probes_are_logged_at_debug_level_only(
         await http.get("/livez")
     assert [record for record in caplog.records if record.name == "bunraku.http.access_log"]
     assert request_count(metrics, method="GET") == 2
+
+
+@pytest.mark.parametrize("endpoint", [read_body, read_body_and_answer])
+async def test_client_that_disconnects_within_its_body_is_counted_as_499(
+    endpoint: Callable[[Request], Awaitable[Response]],
+) -> None:
+    metrics, messages = Metrics(), [{"type": "http.request", "body": b"{", "more_body": True}]
+
+    async def receive() -> Any:
+        return messages.pop() if messages else {"type": "http.disconnect"}
+
+    async def send(_: Any) -> None:
+        """Discard the response, as nobody receives it."""
+
+    app = AccessLogMiddleware(Starlette(routes=[Route("/v1/body", endpoint, methods=["POST"])]), metrics, FakeClock())
+    scope = {"type": "http", "method": "POST", "path": "/v1/body", "headers": [], "query_string": b""}
+    await app(scope, receive, send)
+    assert request_count(metrics) == request_count(metrics, method="POST", status="499") == 1
 
 
 @pytest.mark.parametrize(

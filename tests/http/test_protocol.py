@@ -11,7 +11,7 @@ import pytest
 import uvicorn
 from uvicorn.server import ServerState
 
-from bunraku.http import protocol
+from bunraku.http import protocol, request_body
 from bunraku.http.protocol import HttpLoad, HttpProtocol
 from bunraku.runtime import transport
 from tests.servers import run_server
@@ -186,7 +186,9 @@ class RecordingTransport(asyncio.Transport):
         self.is_closed = True
 
 
-async def test_body_in_tiny_chunks_is_parsed_in_turns() -> None:
+async def test_body_in_tiny_chunks_is_parsed_in_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(request_body, "MAX_SMALL_CHUNKS", 100_000)
+
     async def app(_: object, receive: Callable[[], Awaitable[dict[str, object]]], __: object) -> None:
         while (await receive())["type"] != "http.disconnect":
             continue

@@ -3,6 +3,7 @@ from __future__ import annotations
 import h11
 import pytest
 
+from bunraku.http.request_body import MAX_SMALL_CHUNKS, MIN_CHUNK_BYTES
 from bunraku.http.request_head import MAX_FIELD_BYTES, MAX_FIELDS, MAX_HEAD_BYTES, MAX_TARGET_BYTES, BoundedConnection
 
 UPGRADE = (
@@ -96,8 +97,8 @@ def test_endless_framing_of_a_body_is_rejected(data: bytes) -> None:
                 continue
 
 
-@pytest.mark.parametrize(("chunk", "count"), [(1, 100_000), (100, 10_000), (60_000, 100)])
-def test_chunks_of_any_size_are_accepted(chunk: int, count: int) -> None:
+@pytest.mark.parametrize(("chunk", "count"), [(1, MAX_SMALL_CHUNKS), (MIN_CHUNK_BYTES, 10_000), (60_000, 100)])
+def test_usual_chunks_are_accepted(chunk: int, count: int) -> None:
     connection, size = BoundedConnection(), 0
     connection.receive_data(head("Transfer-Encoding: chunked\r\n", method="POST"))
     data = f"{chunk:x}\r\n".encode() + b"x" * chunk + b"\r\n"
@@ -106,3 +107,19 @@ def test_chunks_of_any_size_are_accepted(chunk: int, count: int) -> None:
         while (event := connection.next_event()) is not h11.NEED_DATA:
             size += len(event.data) if isinstance(event, h11.Data) else 0
     assert size == chunk * count
+
+
+@pytest.mark.parametrize("is_chunked", [True, False])
+@pytest.mark.parametrize("size", [1, MIN_CHUNK_BYTES // 2])
+def test_body_in_many_small_pieces_is_rejected(size: int, is_chunked: bool) -> None:
+    connection = BoundedConnection()
+    framing = "Transfer-Encoding: chunked" if is_chunked else "Content-Length: 1000000"
+    connection.receive_data(head(f"{framing}\r\n", method="POST"))
+    assert isinstance(connection.next_event(), h11.Request)
+    piece = b"%x\r\n%s\r\n" % (size, b"x" * size) if is_chunked else b"x" * size
+    with pytest.raises(h11.RemoteProtocolError, match="small chunks") as raised:  # noqa: PT012
+        for _ in range(3 * MAX_SMALL_CHUNKS):
+            connection.receive_data(piece)
+            while connection.next_event() is not h11.NEED_DATA:
+                continue
+    assert raised.value.error_status_hint == 400

@@ -6,6 +6,7 @@ import msgpack
 import numpy as np
 import pytest
 
+from bunraku.http.openapi import JSON
 from bunraku.ik import batch
 from bunraku.marionette import bend_table
 from bunraku.marionette.proportions import Proportions
@@ -17,8 +18,8 @@ IDENTITY = "396-352-252-560-320-120"
 @pytest.mark.parametrize(
     ("header", "media_type"),
     [
-        (None, batch.JSON),
-        ("application/json; charset=utf-8", batch.JSON),
+        (None, JSON),
+        ("application/json; charset=utf-8", JSON),
         ("Application/MsgPack", batch.MSGPACK),
         ("application/vnd.msgpack", batch.MSGPACK),
     ],
@@ -33,7 +34,7 @@ def test_content_type_is_parsed(header: str | None, media_type: str) -> None:
         (None, batch.MSGPACK),
         ("*/*", batch.MSGPACK),
         ("text/html, application/*;q=0.5", batch.MSGPACK),
-        ("text/html, application/json;q=0.9", batch.JSON),
+        ("text/html, application/json;q=0.9", JSON),
     ],
 )
 def test_accept_header_of_a_messagepack_request(header: str | None, media_type: str) -> None:
@@ -45,7 +46,7 @@ def test_unsupported_media_types_give_415_and_406() -> None:
         batch.parse_content_type("text/csv")
     assert refused.value.status == 415
     with pytest.raises(ProblemError) as refused:
-        batch.negotiate_media_type("text/csv", batch.JSON)
+        batch.negotiate_media_type("text/csv", JSON)
     assert refused.value.status == 406
 
 
@@ -54,11 +55,11 @@ def test_decode_error_names_the_field() -> None:
     assert request.legs == [1.0]
     assert request.targets == []
     with pytest.raises(ProblemError) as refused:
-        batch.decode_request(b'{"proportions": "x", "targets": [[0, 0, 1e300]]}', batch.JSON)
+        batch.decode_request(b'{"proportions": "x", "targets": [[0, 0, 1e300]]}', JSON)
     assert refused.value.status == 422
     assert refused.value.extra["field"] == "targets[0][2]"
     with pytest.raises(ProblemError) as refused:
-        batch.decode_request(b"{", batch.JSON)
+        batch.decode_request(b"{", JSON)
     assert refused.value.status == 400
 
 
@@ -66,7 +67,7 @@ def test_json_and_messagepack_solutions_are_equal() -> None:
     request = batch.SolveRequest(proportions=IDENTITY, targets=[(0.1, -0.4, 0.5)], legs=[0.5])
     proportions = Proportions.parse(IDENTITY)
     data = bend_table.pack_bend_table(bend_table.build_bend_table(proportions))
-    solution = json.loads(batch.solve_batch(request, proportions, data, batch.JSON))
+    solution = json.loads(batch.solve_batch(request, proportions, data, JSON))
     packed = msgpack.unpackb(batch.solve_batch(request, proportions, data, batch.MSGPACK))
     assert solution == packed
     batch.SolveAnswer.model_validate(solution)

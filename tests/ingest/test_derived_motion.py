@@ -8,6 +8,7 @@ import pytest
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.ingest.derived_motion import Derivation, DerivationJob, DerivedMotionFactory
+from bunraku.ingest.motion_id import derive_digest
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext, open_context
@@ -30,7 +31,7 @@ async def build_description(source: CatalogueEntry, result: JobResult) -> dict[s
 
 
 def make_derivation(key: bytes, run: DerivationJob) -> Derivation:
-    return Derivation("one", key, run, build_description, problem_members={"filename": "a.wav"})
+    return Derivation("one", derive_digest("one", key), run, build_description, problem_members={"filename": "a.wav"})
 
 
 async def test_derivation_is_repeated_only_without_its_object(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 from bunraku.ingest import job_process
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.runtime import worker_process
 from bunraku.runtime.worker_message import send_message
 from tests.servers import make_bvh_clip
 
@@ -26,7 +27,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
     assert result.description["frames"] == 15
     assert shares == sorted(set(shares))
     assert (shares[0], shares[-1]) == (0.0, 1.0)
-    assert 5 < len(shares) <= job_process.MAX_PROGRESS_REPORTS + 1
+    assert 5 < len(shares) <= worker_process.MAX_PROGRESS_REPORTS + 1
 
 
 async def test_crashed_job_is_a_rejection(tmp_path: Path) -> None:
@@ -78,7 +79,7 @@ def report_nonsense(sender: Connection, *_: object) -> None:
 async def test_hostile_worker_is_a_rejection(
     worker: Callable[..., None], title: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(job_process, "_run_in_process", worker)
+    monkeypatch.setattr(worker_process, "_run_worker", worker)
     result = await job_process.run_job(JobKind.MOTION, ("m1",), 15.0)
     assert isinstance(result, JobRejection)
     assert result.title.startswith(title)

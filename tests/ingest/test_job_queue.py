@@ -13,6 +13,7 @@ from bunraku.ingest import job_queue
 from bunraku.ingest.job_queue import JobQueue, JobQueueTiming, UploadJob
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime import request_id
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
@@ -41,7 +42,7 @@ class QueueReplica:
     """Queue of one replica, with a handler that records its calls."""
 
     def __init__(self, context: ServiceContext, error: Exception | None = None) -> None:
-        self.queue = JobQueue(context, asyncio.Semaphore(2), {"motion": self._handle_job}, TIMING)
+        self.queue = JobQueue(context, WorkerSlots(), {"motion": self._handle_job}, TIMING)
         self.handled_jobs: list[tuple[dict[str, Any], bytes]] = []
         self.requests: list[str] = []
         self.first_job_handled = asyncio.Event()

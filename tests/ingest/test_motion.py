@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bunraku.ingest.motion import MotionOperation
+from bunraku.ingest.audio import create_audio_job
+from bunraku.ingest.motion import MotionOperation, create_motion_job
 from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.source_file import SourceFile
@@ -52,3 +53,13 @@ async def test_resumed_job_keeps_its_subject(tmp_path: Path) -> None:
         assert entry is not None
         assert entry.subject == "aiko"
         assert entry.bytes > 0
+
+
+def test_jobs_of_subjects_with_the_same_file_are_separate() -> None:
+    digest = bytes(32)
+    jobs = [create_motion_job(digest, "a.bvh", subject) for subject in ("aiko", "ben", "aiko")]
+    jobs += [create_audio_job("m1", digest, "a.wav", subject) for subject in ("aiko", "ben", "aiko")]
+    assert len({job.id for job in jobs}) == 4
+    assert jobs[0].id == jobs[2].id
+    assert jobs[3].id == jobs[5].id
+    assert jobs[0].details["motion"] == jobs[1].details["motion"]

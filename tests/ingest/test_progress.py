@@ -7,8 +7,8 @@ from typing import Any
 import httpx2
 import pytest
 
-from bunraku.ingest.admission import MAX_ACTIVE_OPERATIONS
 from bunraku.ingest.progress import UploadProgress
+from bunraku.ingest.upload import MAX_UPLOADS_PER_HOLDER
 from tests.servers import make_bvh_clip, run_server
 
 
@@ -72,7 +72,7 @@ async def test_disconnect_cancels_the_upload(tmp_path: Path) -> None:
             # all slots are free again
             responses = [
                 await post(http, f"upload-{number:02}", make_bvh_clip(0.2, 902))
-                for number in range(MAX_ACTIVE_OPERATIONS + 1)
+                for number in range(MAX_UPLOADS_PER_HOLDER + 1)
             ]
             assert {response.status_code for response in responses} == {200, 201}
 

@@ -17,7 +17,7 @@ from bunraku.ingest.source_file import SourceFile
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.marionette.input_log import InputLog
 from bunraku.messaging.bus import NoResponse
-from bunraku.messaging.recording_request import MAX_RECORDING_S
+from bunraku.messaging.recording_request import MAX_RECORDING_S, pack_camera
 from bunraku.playout import timeline
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
@@ -54,7 +54,7 @@ def make_request(**changes: Any) -> bytes:
         "name": None,
         "begin": START_CLOCK_US,
         "end": START_CLOCK_US + SECOND_US,
-        "camera": [],
+        "camera": b"",
     } | changes
     packed: bytes = msgpack.packb(values)
     return packed
@@ -70,7 +70,7 @@ async def send_request(context: ServiceContext, message: bytes) -> dict[str, Any
 
 
 async def test_session_is_recorded_as_a_motion(context: ServiceContext, motion_id: str) -> None:
-    camera = [[float(START_CLOCK_US), 0.0, 1.2, 4.0, 0.0, 1.0, 0.0, 0.5]]
+    camera = pack_camera([[START_CLOCK_US, 0.0, 1.2, 4.0, 0.0, 1.0, 0.0, 0.5]])
     motion = (await send_request(context, make_request(camera=camera)))["motion"]
     entry = await context.catalogue.get_motion(motion["id"])
     stored = await context.motion_store.get(motion["id"])
@@ -98,7 +98,7 @@ async def test_session_is_recorded_as_a_motion(context: ServiceContext, motion_i
         ({"log": "../motions/dance"}, 404, "log"),
         ({"end": START_CLOCK_US}, 422, "seconds"),
         ({"begin": START_CLOCK_US - 2 * SECOND_US, "end": START_CLOCK_US - SECOND_US}, 422, "seconds"),
-        ({"camera": [[float(START_CLOCK_US), 0, 1, 4, 0, 1, 0, 9.0]]}, 422, "camera"),
+        ({"camera": pack_camera([[START_CLOCK_US, 0, 1, 4, 0, 1, 0, 9.0]])}, 422, "camera"),
     ],
 )
 async def test_impossible_recording_is_a_problem_and_not_stored(
@@ -174,17 +174,17 @@ VALID_REQUEST: dict[str, Any] = {
     "name": "Mine",
     "begin": 1_000_000,
     "end": 3_000_000,
-    "camera": [[1, *range(7)]],
+    "camera": pack_camera([[1, *range(7)]]),
 }
 
 
 def test_recording_request_is_parsed() -> None:
     request = parse_recording_request(msgpack.packb(VALID_REQUEST | {"later": "more"}))
     assert (request.log, request.name, request.begin, request.end) == ("l", "Mine", 1_000_000, 3_000_000)
-    assert request.camera == [[1, 0, 1, 2, 3, 4, 5, 6]]
+    assert request.camera_keyframes.tolist() == [[1, 0, 1, 2, 3, 4, 5, 6]]
     assert request.frame_count == 120
     minimal = parse_recording_request(msgpack.packb({key: VALID_REQUEST[key] for key in ("log", "begin", "end")}))
-    assert (minimal.name, minimal.camera) == (None, [])
+    assert (minimal.name, minimal.camera) == (None, b"")
 
 
 @pytest.mark.parametrize(
@@ -197,9 +197,9 @@ def test_recording_request_is_parsed() -> None:
         ({"end": 999}, "seconds"),
         ({"end": 2_000_000 + MAX_RECORDING_S * 1_000_000}, "seconds"),
         ({"name": "n" * 201}, "name"),
-        ({"camera": [[1, 2]]}, "camera[0]"),
-        ({"camera": [[1, *range(7)], [2, *range(6), float("nan")]]}, "camera[1][7]"),
-        ({"camera": [[2, *range(7)], [2, *range(7)]]}, "camera"),
+        ({"camera": bytes(72)}, "camera"),
+        ({"camera": pack_camera([[1, *range(7)], [2, *range(6), float("nan")]])}, "camera"),
+        ({"camera": pack_camera([[2, *range(7)], [2, *range(7)]])}, "camera"),
     ],
 )
 def test_invalid_request_names_its_field(changes: dict[str, Any], field: str) -> None:

@@ -14,7 +14,7 @@ from bunraku.messaging.bus import ResponderFailed
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.problem import ProblemError
 from bunraku.session import recorder
-from bunraku.session.recorder import Recording
+from bunraku.session.recording import PackedRecording
 from bunraku.session.schema import SessionEdit
 from tests.simulation.library import SOURCE_FILES, STORED_MOTIONS, source_motion_id
 from tests.simulation.link import LinkQuality
@@ -233,7 +233,7 @@ class Operations:
         recorded = await self._call(
             f"record {session}",
             replica,
-            lambda: recorder.record_session(stage, Recording(seconds=0.5), replica.context),
+            lambda: recorder.record_session(stage, PackedRecording(None, 0.5, b""), replica.context),
             self._world.note,
         )
         if recorded is not None:

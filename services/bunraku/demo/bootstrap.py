@@ -13,7 +13,6 @@ import logging
 from pathlib import Path
 
 from bunraku.ingest.audio import AudioOperation
-from bunraku.ingest.keyframe import Staging
 from bunraku.ingest.motion import MotionOperation
 from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.scene import SceneOperation
@@ -104,9 +103,9 @@ async def _create_motion(context: ServiceContext, fingerprint: str) -> str:
         slots = WorkerSlots()
         await MotionOperation(context, slots).ingest_file(motion, SourceFile(source, f"{title}.bvh"))
         with_music, _ = await AudioOperation(context, slots).add_audio(motion, SourceFile(song, f"{title}.wav"), digest)
-        staged, _ = await SceneOperation(context, slots).add_scene(
-            with_music.id, await asyncio.to_thread(_build_staging)
-        )
+        staging = Path(folder) / "staging"
+        await asyncio.to_thread(_write_staging, staging)
+        staged, _ = await SceneOperation(context, slots).add_scene(with_music.id, staging)
         for intermediate in (motion, with_music.id):
             await context.catalogue.remove_motion(intermediate)
             await context.motion_store.remove(intermediate)
@@ -134,11 +133,11 @@ def _write_music(path: Path) -> bytes:
     return hashlib.sha256(data).digest()
 
 
-def _build_staging() -> Staging:
+def _write_staging(path: Path) -> None:
     from bunraku.demo.choreography import SCORE
     from bunraku.demo.staging import camera_keyframes, light_keyframes
 
-    return Staging.model_validate({"camera": camera_keyframes(SCORE), "lights": light_keyframes(SCORE)})
+    path.write_text(json.dumps({"camera": camera_keyframes(SCORE), "lights": light_keyframes(SCORE)}))
 
 
 def _code_fingerprint() -> str:

@@ -11,8 +11,8 @@ from starlette.requests import HTTPConnection
 
 ACCESS_SCOPE_KEY = "bunraku.access"
 """Key of the ASGI scope under which `AuthorizationMiddleware` stores the `Access` of a request or WebSocket."""
-DEFAULT_MAX_BODY_BYTES = 64 << 10
-"""Maximum size of a request body for routes that declare none."""
+DEFAULT_MAX_BODY_BYTES = 4 << 10
+"""Maximum size of a request body for routes that declare none. The service parses no larger body itself."""
 _REQUIREMENT_ATTRIBUTE = "__requirement__"
 
 Endpoint = TypeVar("Endpoint", bound=Callable[..., Any])

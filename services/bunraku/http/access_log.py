@@ -7,6 +7,7 @@ from collections.abc import Callable
 from http import HTTPMethod
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.requests import ClientDisconnect
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from bunraku.runtime import request_id
@@ -63,12 +64,21 @@ class AccessLogMiddleware:
                 self._record(scope, status, (self._clock() - started_at) / 1e6)
 
         status = CLIENT_CLOSED_REQUEST
+        is_started = is_disconnected = False
+
+        async def receive_and_note() -> Message:
+            nonlocal is_disconnected
+            message = await receive()
+            is_disconnected = is_disconnected or (message["type"] == "http.disconnect" and not is_started)
+            return message
 
         async def send_and_record(message: Message) -> None:
-            nonlocal status
+            nonlocal status, is_started
             kind = message["type"]
+            is_started = True
             if kind in ("http.response.start", "websocket.http.response.start"):
-                status = message["status"]
+                # nobody receives the response to a client that has disconnected
+                status = CLIENT_CLOSED_REQUEST if is_disconnected else message["status"]
                 MutableHeaders(raw=_mutable_headers(message))[REQUEST_ID_HEADER] = request
             elif kind == "websocket.accept":
                 # no request id in the handshake: it would delay the first block by 15 ms on a constrained link
@@ -82,7 +92,9 @@ class AccessLogMiddleware:
 
         with request_id.bind(request):
             try:
-                await self._app(scope, receive, send_and_record)
+                await self._app(scope, receive_and_note, send_and_record)
+            except ClientDisconnect:
+                status = CLIENT_CLOSED_REQUEST
             except Exception:
                 status = 500
                 raise

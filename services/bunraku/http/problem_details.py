@@ -21,6 +21,12 @@ RETRY_AFTER_S = 2
 MAX_TEXT_CHARACTERS = 1_000
 """Maximum length of a text in a problem document."""
 
+_PROBLEM_HEADERS: dict[int, dict[str, str]] = {
+    # the rest of a body that is too large is not read
+    HTTPStatus.REQUEST_ENTITY_TOO_LARGE: {"Connection": "close"},
+    HTTPStatus.SERVICE_UNAVAILABLE: {"Retry-After": str(RETRY_AFTER_S)},
+}
+
 _log = logging.getLogger(__name__)
 
 
@@ -73,9 +79,7 @@ def install_problem_handlers(app: FastAPI) -> None:
 
     @app.exception_handler(ProblemError)
     async def answer_problem(_: Request, error: ProblemError) -> JSONResponse:
-        # the rest of a body that is too large is not read
-        too_large = error.status == HTTPStatus.REQUEST_ENTITY_TOO_LARGE
-        return problem_response(error, {"Connection": "close"} if too_large else None)
+        return problem_response(error, _PROBLEM_HEADERS.get(error.status))
 
     @app.exception_handler(BackendUnavailable)
     async def answer_unavailable(request: Request, error: BackendUnavailable) -> JSONResponse:

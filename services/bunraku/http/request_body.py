@@ -1,4 +1,4 @@
-"""Limits on the size and the duration of request bodies, enforced while they are received."""
+"""Limits on the size, the duration and the chunks of request bodies, enforced while they are received."""
 
 from __future__ import annotations
 
@@ -8,8 +8,12 @@ from collections.abc import Callable
 from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive
 
-MIN_BODY_BYTES_PER_S = 1_000
-"""Minimum rate of a body after the initial timeout, in bytes per second."""
+MIN_BODY_BYTES_PER_S = 500
+"""Minimum throughput of a body in each time window, in bytes per second: half of a phone's at 9.6 kbit/s."""
+MIN_CHUNK_BYTES = 256
+"""Minimum average size of a body's chunks; a body over a link with an MTU of 296 has segments of this size."""
+MAX_SMALL_CHUNKS = 64
+"""Chunks of a body for which the average does not count."""
 
 
 def too_large_detail(max_bytes: int) -> str:
@@ -17,33 +21,61 @@ def too_large_detail(max_bytes: int) -> str:
     return f"the request body has more than {max_bytes} bytes, the limit of this route"
 
 
-def limit_body(receive: Receive, max_bytes: int | None, timeout_s: float, clock: Callable[[], float]) -> Receive:
+def limit_body(receive: Receive, max_bytes: int | None, window_s: float, clock: Callable[[], float]) -> Receive:
     """Return `receive` with limits on the request body. `clock` returns seconds.
 
-    It raises HTTPException 413 as soon as the body has more than `max_bytes` bytes. It raises HTTPException 408 if the
-    body takes longer than `timeout_s` plus one second per `MIN_BODY_BYTES_PER_S` bytes.
+    It raises HTTPException 413 as soon as the body has more than `max_bytes` bytes. It raises HTTPException 408 at the
+    end of a window of `window_s` seconds in which neither the body ended nor `MIN_BODY_BYTES_PER_S` arrived.
     """
     # FastAPI passes on only HTTPException from `receive`, so these errors are no `ProblemError`
-    started_at, size, is_complete = clock(), 0, False
+    window_end, window_bytes, size, is_complete = clock() + window_s, 0, 0, False
+
+    def check_progress() -> None:
+        """Begin the next window if this one is over; raise HTTPException 408 if too little arrived in it."""
+        nonlocal window_end, window_bytes
+        if (now := clock()) < window_end:
+            return
+        if window_bytes < MIN_BODY_BYTES_PER_S * window_s:
+            detail = f"the request body arrived too slowly: {window_bytes} bytes in {window_s:g} s"
+            raise HTTPException(408, detail, {"Connection": "close"})
+        window_end, window_bytes = now + window_s, 0
 
     async def receive_limited() -> Message:
-        nonlocal size, is_complete
-        if is_complete:
-            return await receive()
-        remaining_s = started_at + timeout_s + size / MIN_BODY_BYTES_PER_S - clock()
-        try:
-            async with asyncio.timeout(max(remaining_s, 0.0)):
-                message = await receive()
-        except TimeoutError:
-            detail = f"the request body arrived too slowly: {size} bytes in {clock() - started_at:.0f} s"
-            raise HTTPException(408, detail, {"Connection": "close"}) from None
-        if message["type"] == "http.request":
-            size += len(message.get("body", b""))
-            is_complete = not message.get("more_body", False)
+        nonlocal size, window_bytes, is_complete
+        while not is_complete:
+            try:
+                async with asyncio.timeout(max(window_end - clock(), 0.0)):
+                    message = await receive()
+            except TimeoutError:
+                check_progress()
+                continue
+            if message["type"] != "http.request":
+                is_complete = True
+                return message
+            received = len(message.get("body", b""))
+            size, window_bytes = size + received, window_bytes + received
             if max_bytes is not None and size > max_bytes:
                 raise HTTPException(413, too_large_detail(max_bytes), {"Connection": "close"})
-        else:
-            is_complete = True
-        return message
+            is_complete = not message.get("more_body", False)
+            if not is_complete:
+                check_progress()
+            return message
+        return await receive()
 
     return receive_limited
+
+
+class ChunkLimit:
+    """Limit on the number of chunks of one body, each of which costs as much as a large one.
+
+    Chunks are those of the transfer coding, or the segments in which a body without one arrives.
+    """
+
+    def __init__(self) -> None:
+        self._chunks = self._bytes = 0
+
+    def add_chunk(self, size: int) -> bool:
+        """Count a chunk; return False if there are too many for the size of the body so far."""
+        self._chunks += 1
+        self._bytes += size
+        return self._chunks <= MAX_SMALL_CHUNKS + self._bytes / MIN_CHUNK_BYTES

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import h11
 
+from bunraku.http.request_body import ChunkLimit
+
 MAX_HEAD_BYTES = 16 << 10
 """Maximum size of the request line and header fields."""
 MAX_TARGET_BYTES = 8_000
@@ -28,6 +30,7 @@ class BoundedConnection(h11.Connection):
         super().__init__(h11.SERVER, MAX_HEAD_BYTES)
         self.error: h11.RemoteProtocolError | None = None
         self._received_bytes = self._body_bytes = 0
+        self._chunk_limit = ChunkLimit()
 
     def receive_data(self, data: bytes) -> None:
         self._received_bytes += len(data)
@@ -38,9 +41,12 @@ class BoundedConnection(h11.Connection):
             event = super().next_event()
             if isinstance(event, h11.Data):
                 self._body_bytes += len(event.data)
+                if not self._chunk_limit.add_chunk(len(event.data)):
+                    _reject("the body has too many small chunks", 400)
             self._check_framing()
             if isinstance(event, h11.Request):
                 self._received_bytes = self._body_bytes = 0
+                self._chunk_limit = ChunkLimit()
                 check_request_head(event)
                 if _is_websocket_upgrade(event) and self.trailing_data[0]:
                     _reject("data follows a WebSocket handshake before its response", 400)

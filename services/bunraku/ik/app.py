@@ -6,18 +6,22 @@ import asyncio
 from functools import partial
 from typing import Annotated
 
-from fastapi import FastAPI, Header, Request, Response
+from fastapi import Depends, FastAPI, Header, Request, Response
 
 from bunraku import __version__
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, requires
+from bunraku.http.large_body import BodySource, LargeBodies, large_response
 from bunraku.ik import batch
 from bunraku.ik.resource_cache import CachedResource, ResourceCache
 from bunraku.marionette import bend_table, figures
-from bunraku.marionette.proportions import Proportions, ProportionsError
+from bunraku.marionette.proportions import Proportions
+from bunraku.runtime import worker_process
 from bunraku.runtime.problem import ProblemError
 
 IMMUTABLE_CACHE_CONTROL = "public, max-age=31536000, immutable"
+
+worker_process.preload_modules("bunraku.ik.batch")
 
 
 def build_table(proportions: Proportions) -> bytes:
@@ -30,19 +34,14 @@ def build_figure(proportions: Proportions, name: figures.Figure) -> bytes:
     return figures.draw_figure(proportions, name).encode()
 
 
-def parse_proportions(identity: str) -> Proportions:
-    """Parse an identity; raises `ProblemError` 422 with field and hint."""
-    try:
-        return Proportions.parse(identity)
-    except ProportionsError as error:
-        raise ProblemError(422, "No such arm", str(error), field=error.field, hint=error.hint) from error
-
-
 def create_app() -> FastAPI:
     """Create the service, which has no state but its caches."""
     app = FastAPI(title="Bunraku inverse kinematics", version=__version__, openapi_url=None)
     problem_details.install_problem_handlers(app)
     resources = ResourceCache()
+    # one batch at a time, in a thread, so that the event loop stays free
+    solving = asyncio.Semaphore(1)
+    large_bodies = LargeBodies("large batches", max_inline_bytes=batch.MAX_INLINE_BODY_BYTES)
 
     async def table_for(request: Request, proportions: Proportions) -> CachedResource:
         return await resources.get(request, proportions, partial(build_table, proportions))
@@ -61,7 +60,7 @@ def create_app() -> FastAPI:
         request: Request, proportions: str, if_none_match: Annotated[str | None, Header()] = None
     ) -> Response:
         """Bend table of the arm with proportions `L0-L1-L2-M0-M1-M2` in thousandths or ten-thousandths."""
-        stored = await table_for(request, parse_proportions(proportions))
+        stored = await table_for(request, batch.parse_proportions(proportions))
         return _resource_response(stored, "application/octet-stream", if_none_match)
 
     @app.get(
@@ -80,7 +79,7 @@ def create_app() -> FastAPI:
     ) -> Response:
         """Figure 8 (`circle`) or 9 (`horizontal`) of the paper for this arm: the arm while its tip follows the path,
         solved as in the paper and exactly."""
-        arm, figure = parse_proportions(proportions), next((one for one in figures.FIGURES if one == name), None)
+        arm, figure = batch.parse_proportions(proportions), next((one for one in figures.FIGURES if one == name), None)
         if figure is None:
             hint = " or ".join(figures.FIGURES)
             raise ProblemError(404, "No such figure", f"there is no figure {name[:60]!r}", field="name", hint=hint)
@@ -89,15 +88,17 @@ def create_app() -> FastAPI:
 
     @app.post("/v1/solve", response_model=batch.SolveAnswer, openapi_extra=batch.OPENAPI_REQUEST_BODY)
     @requires(Role.VIEW, allow_bound=True, max_body_bytes=batch.MAX_BODY_BYTES)
-    async def solve(request: Request) -> Response:
+    async def solve(request: Request, body: BodySource = Depends(large_bodies.receive)) -> Response:
         """Solve arms for hand targets and legs for thigh angles, in a batch; JSON or MessagePack."""
         kind = batch.parse_content_type(request.headers.get("content-type"))
         accepted = batch.negotiate_media_type(request.headers.get("accept"), kind)
-        body = await batch.read_body(request)
-        solve_request = await asyncio.to_thread(batch.decode_request, body, kind)
-        proportions = parse_proportions(solve_request.proportions)
+        if not isinstance(body, bytes):
+            return large_response(await large_bodies.process(batch.solve_body, body, kind, accepted), accepted)
+        solve_request = batch.decode_request(body, kind)
+        proportions = batch.parse_proportions(solve_request.proportions)
         stored = await table_for(request, proportions)
-        answer = await asyncio.to_thread(batch.solve_batch, solve_request, proportions, stored.data, accepted)
+        async with solving:
+            answer = await asyncio.to_thread(batch.solve_batch, solve_request, proportions, stored.data, accepted)
         return Response(answer, media_type=accepted)
 
     return app

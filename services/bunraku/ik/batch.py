@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import Annotated
 
 import msgpack
 import numpy as np
-from fastapi import Request
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from bunraku.http.large_body import BodySource, read_body
+from bunraku.http.openapi import JSON, request_body
 from bunraku.http.problem_details import invalid_field_problem
+from bunraku.http.structured_body import BodyStructure, decode_json, decode_msgpack
 from bunraku.marionette import arm_batch, bend_table, leg
-from bunraku.marionette.proportions import Proportions
+from bunraku.marionette.proportions import Proportions, ProportionsError
 from bunraku.runtime.problem import ProblemError
 
-JSON = "application/json"
 MSGPACK = "application/msgpack"
 _MEDIA_TYPES = {JSON: JSON, MSGPACK: MSGPACK, "application/x-msgpack": MSGPACK, "application/vnd.msgpack": MSGPACK}
 
-MAX_TARGETS = 100_000
-MAX_BODY_BYTES = 16 * 1024 * 1024
+MAX_TARGETS = 10_000
+"""Maximum number of targets, and of legs, of one request: its answer has 3 MB as JSON."""
+MAX_BODY_BYTES = 1 << 20
+"""Maximum size of a request: `MAX_TARGETS` targets and legs with 17 digits per number have 900 kB as JSON."""
+MAX_INLINE_BODY_BYTES = 1 << 10
+"""Maximum size of a request that the service itself solves: at most 250 targets, 10 ms."""
+BODY_STRUCTURE = BodyStructure(max_values=8 * MAX_TARGETS)
+"""Structure of a request: four values per target and one per leg, with room for a request that has too many."""
 
 FiniteNumber = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
 Point = tuple[FiniteNumber, FiniteNumber, FiniteNumber]
@@ -35,10 +42,16 @@ class SolveRequest(BaseModel):
         description="L0-L1-L2-M0-M1-M2 in thousandths or ten-thousandths", examples=["393-351-256-560-320-120"]
     )
     targets: list[Point] = Field(
-        default=[], max_length=MAX_TARGETS, description="hand tips from the shoulder, y up, in arm lengths"
+        fail_fast=True,
+        default=[],
+        max_length=MAX_TARGETS,
+        description="hand tips from the shoulder, y up, in arm lengths",
     )
     legs: list[FiniteNumber] = Field(
-        default=[], max_length=MAX_TARGETS, description="thighs' angles forwards from straight down, radians"
+        fail_fast=True,
+        default=[],
+        max_length=MAX_TARGETS,
+        description="thighs' angles forwards from straight down, radians",
     )
 
 
@@ -69,13 +82,7 @@ class SolveAnswer(BaseModel):
     legs: Legs
 
 
-OPENAPI_REQUEST_BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {kind: {"schema": SolveRequest.model_json_schema()} for kind in (JSON, MSGPACK)},
-    },
-}
-"""Request body for OpenAPI; it is parsed by hand, because its type depends on Content-Type."""
+OPENAPI_REQUEST_BODY = request_body(SolveRequest, JSON, MSGPACK)
 
 
 def parse_content_type(header: str | None) -> str:
@@ -110,29 +117,30 @@ def negotiate_media_type(header: str | None, default: str) -> str:
     )
 
 
-async def read_body(request: Request) -> bytes:
-    """Read the body; raises `ProblemError` 413 as soon as it exceeds `MAX_BODY_BYTES`."""
-    body = bytearray()
-    async for chunk in request.stream():
-        body += chunk
-        if len(body) > MAX_BODY_BYTES:
-            raise ProblemError(
-                413, "Too large", f"the body is more than {MAX_BODY_BYTES} bytes", hint="send several batches"
-            )
-    return bytes(body)
-
-
 def decode_request(body: bytes, media_type: str) -> SolveRequest:
-    """Decode a request; raises `ProblemError` 400 for a malformed body, 422 with the field for an invalid one."""
-    try:
-        content = json.loads(body) if media_type == JSON else msgpack.unpackb(body)
-    except (ValueError, RecursionError, msgpack.exceptions.UnpackException) as error:
-        raise ProblemError(400, "Unreadable body", f"the body is not {media_type}: {error}") from error
+    """Decode a request; raises `ProblemError` 400 for a malformed body, 413 or 422 with the field if it is invalid."""
+    content = (decode_json if media_type == JSON else decode_msgpack)(body, BODY_STRUCTURE)
     try:
         return SolveRequest.model_validate(content)
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         raise invalid_field_problem(first["loc"], first["msg"]) from error
+
+
+def parse_proportions(identity: str) -> Proportions:
+    """Parse an identity; raises `ProblemError` 422 with field and hint."""
+    try:
+        return Proportions.parse(identity)
+    except ProportionsError as error:
+        raise ProblemError(422, "No such arm", str(error), field=error.field, hint=error.hint) from error
+
+
+def solve_body(source: BodySource, media_type: str, answer_type: str) -> bytes:
+    """Decode and solve a request and return the response; raises `ProblemError`. It takes a second of CPU time."""
+    request = decode_request(read_body(source), media_type)
+    proportions = parse_proportions(request.proportions)
+    table = bend_table.pack_bend_table(bend_table.build_bend_table(proportions))
+    return solve_batch(request, proportions, table, answer_type)
 
 
 def solve_batch(request: SolveRequest, proportions: Proportions, table_bytes: bytes, media_type: str) -> bytes:

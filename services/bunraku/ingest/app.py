@@ -7,16 +7,19 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
-from fastapi import FastAPI, Path, Query, Request, Response
+from fastapi import Depends, FastAPI, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
-from starlette.requests import ClientDisconnect
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
+from bunraku.http.disconnect import run_until_disconnect
+from bunraku.http.large_body import BodySource
+from bunraku.http.openapi import request_body
 from bunraku.http.problem_details import motion_not_found
 from bunraku.ingest.audio import AudioOperation, create_audio_job
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_queue import JobQueue
+from bunraku.ingest.keyframe import MAX_BODY_BYTES as MAX_SCENE_BODY_BYTES
 from bunraku.ingest.keyframe import Staging
 from bunraku.ingest.metrics import register_metrics
 from bunraku.ingest.motion import MotionOperation, create_motion_job
@@ -32,8 +35,6 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import InvalidCursor
 from bunraku.storage.removal import remove_motion
 
-MAX_KEYFRAMES_BYTES = 16 << 20
-"""Maximum size of a request with a camera and lights."""
 UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
 """Pattern of an upload's name, which its client chooses at random."""
 
@@ -77,12 +78,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         `GET /v1/uploads/{upload}` reports the progress meanwhile.
         """
         subject = access_of(request).subject
-        try:
-            outcome = await uploads.receive(
-                request, upload, lambda digest: create_motion_job(digest, filename, subject)
-            )
-        except ClientDisconnect:
-            return _disconnected_response()
+        outcome = await uploads.receive(request, upload, lambda digest: create_motion_job(digest, filename, subject))
         return _stored_response(outcome)
 
     @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
@@ -94,24 +90,22 @@ def create_app(context: ServiceContext) -> FastAPI:
         new motion with 200. `upload` is the same as for uploaded motions.
         """
         subject = access_of(request).subject
-        try:
-            await soundtracks.require_motion(motion)
-            outcome = await uploads.receive(
-                request, upload, lambda digest: create_audio_job(motion, digest, filename, subject)
-            )
-        except ClientDisconnect:
-            return _disconnected_response()
+        await soundtracks.require_motion(motion)
+        outcome = await uploads.receive(
+            request, upload, lambda digest: create_audio_job(motion, digest, filename, subject)
+        )
         return _stored_response(outcome)
 
-    @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"])
-    @requires(Role.INGEST, max_body_bytes=MAX_KEYFRAMES_BYTES)
-    async def add_scene(motion: str, staging: Staging, request: Request) -> Response:
+    @app.post("/v1/motions/{motion}/scene", status_code=201, tags=["motions"], openapi_extra=request_body(Staging))
+    @requires(Role.INGEST, max_body_bytes=MAX_SCENE_BODY_BYTES)
+    async def add_scene(motion: str, request: Request, body: BodySource = Depends(scenes.bodies.receive)) -> Response:
         """Create a copy of a motion with a camera and lights, given as keyframes in motion time.
 
         Omitted parts stay as in the original, which stays unchanged. The same keyframes again return the same new
         motion with 200.
         """
-        return _stored_response(await scenes.add_scene(motion, staging, access_of(request).subject))
+        derivation = scenes.add_scene(motion, body, access_of(request).subject)
+        return _stored_response(await run_until_disconnect(request, derivation))
 
     @app.post("/v1/motions/{motion}/performers", status_code=201, tags=["motions"])
     @requires(Role.INGEST)
@@ -121,13 +115,19 @@ def create_app(context: ServiceContext) -> FastAPI:
         The copy has the sound, camera and lights of the original, which stays unchanged. The same motions with the same
         placement again return the same new motion with 200.
         """
-        return _stored_response(await performers.add_performers(motion, body, access_of(request).subject))
+        derivation = performers.add_performers(motion, body, access_of(request).subject)
+        return _stored_response(await run_until_disconnect(request, derivation))
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])
     @requires(Role.INGEST)
-    async def progress(upload: Annotated[str, Path(pattern=UPLOAD_NAME_PATTERN)], response: Response) -> UploadProgress:
-        """Return the stage of an upload in progress and the completed share of that stage; 404 before and after."""
-        current = uploads.get_progress(upload)
+    async def progress(
+        upload: Annotated[str, Path(pattern=UPLOAD_NAME_PATTERN)], request: Request, response: Response
+    ) -> UploadProgress:
+        """Return the stage of an upload in progress and the completed share of that stage; 404 before and after.
+
+        An upload is visible to its own subject only.
+        """
+        current = uploads.get_progress(access_of(request).subject, upload)
         if current is None:
             raise ProblemError(404, "No such upload", f"no upload {upload!r} is in progress on this server")
         response.headers["Cache-Control"] = "no-store"
@@ -185,11 +185,6 @@ def create_app(context: ServiceContext) -> FastAPI:
 def _stored_response(outcome: StoreOutcome) -> Response:
     entry, is_new = outcome
     return JSONResponse(entry_json(entry), 201 if is_new else 200, {"Location": f"/v1/motions/{entry.id}"})
-
-
-def _disconnected_response() -> Response:
-    # the client has disconnected and does not read it
-    return Response(status_code=400)
 
 
 _BINARY_REQUEST_BODY = {

@@ -11,7 +11,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.job_queue import JobDetails, UploadJob
-from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.ingest.motion_id import derive_digest, derive_job_id
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import JobRejection, JobResult
@@ -30,7 +30,7 @@ def create_audio_job(motion_id: str, digest: bytes, filename: str, subject: str)
         "filename": clean_filename(filename),
         "subject": subject,
     }
-    return UploadJob(f"{motion_id}-{derive_motion_id(digest)}", details)
+    return UploadJob(derive_job_id(motion_id, subject, digest), details)
 
 
 class AudioOperation:
@@ -74,7 +74,7 @@ class AudioOperation:
         return await self._derived_motions.find_or_create(
             Derivation(
                 motion_id,
-                b" with the sound " + digest,
+                derive_digest(motion_id, b" with the sound " + digest),
                 run,
                 describe,
                 source.subject,

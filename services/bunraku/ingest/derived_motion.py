@@ -5,7 +5,6 @@ The id of a derived motion is a hash of its source and of the addition, so that 
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,8 +29,8 @@ class Derivation:
     """A motion to derive."""
 
     source_id: str
-    key: bytes
-    """Identity of the addition: equal keys give the same motion."""
+    digest: bytes
+    """Identity of the new motion, by `derive_digest`: equal additions to one motion give the same motion."""
     run: DerivationJob
     describe: DescriptionBuilder
     subject: str = ""
@@ -66,12 +65,12 @@ class DerivedMotionFactory:
         """Return the derived motion, created unless it is stored already; raise `ProblemError`."""
         context = self._context
         source = await self.require_motion(derivation.source_id)
-        motion_id = derive_motion_id(hashlib.sha256(derivation.source_id.encode() + derivation.key).digest())
+        motion_id = derive_motion_id(derivation.digest)
         known = await context.catalogue.get_motion(motion_id)
         if known is not None and await context.motion_store.get(motion_id) is not None:
             return StoreOutcome(known, False)
         await check_quota(context, derivation.subject)
-        async with self._worker_slots:
+        async with self._worker_slots.hold(derivation.subject):
             # loaded only now, as the source may have been removed while this waited
             outcome = await derivation.run(motion_id, await self.require_object(derivation.source_id))
         result = require_result(outcome, **derivation.problem_members)

@@ -19,6 +19,7 @@ from typing import Any
 
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
+from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.heartbeat_observer import HeartbeatObserver
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
@@ -71,7 +72,7 @@ class JobQueue:
     def __init__(
         self,
         context: ServiceContext,
-        worker_slots: asyncio.Semaphore,
+        worker_slots: WorkerSlots,
         handlers: Mapping[str, JobHandler],
         timing: JobQueueTiming = DEFAULT_TIMING,
     ) -> None:
@@ -85,6 +86,8 @@ class JobQueue:
         # own jobs that nothing ran at the last search
         self._left_jobs: set[str] = set()
         self._hold_observer = HeartbeatObserver(timing.lease_us * 1e-6)
+        # one file at a time is in memory
+        self._storing = asyncio.Semaphore(1)
         self._resumed_tasks: set[asyncio.Task[None]] = set()
         self.resumed_jobs = 0
         """Number of abandoned jobs that this replica has resumed."""
@@ -101,7 +104,8 @@ class JobQueue:
         Raise `BackendUnavailable`, or `ProblemError` (507) without storage space.
         """
         motion_store, catalogue = self._context.motion_store, self._context.catalogue
-        await motion_store.put_source(job.id, await asyncio.to_thread(path.read_bytes))
+        async with self._storing:
+            await motion_store.put_source(job.id, await asyncio.to_thread(path.read_bytes))
         self._held_jobs.add(job.id)
         try:
             now = self._context.clock()

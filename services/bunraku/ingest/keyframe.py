@@ -5,13 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from bunraku.codec.scene import MAX_FIELD_OF_VIEW_RAD, MIN_FIELD_OF_VIEW_RAD
+from bunraku.http.large_body import BodySource, read_body
+from bunraku.http.problem_details import invalid_field_problem
+from bunraku.http.structured_body import BodyStructure, decode_json
+from bunraku.ingest.motion_id import derive_digest
+from bunraku.runtime.problem import ProblemError
 
 MAX_KEYFRAMES = 10_000
 """Maximum number of keyframes of one camera or light."""
 MAX_LIGHTS = 8
+MAX_BODY_BYTES = 8 << 20
+"""Maximum size of a request with a camera and lights: 80,000 keyframes with four decimals, or 40,000 with 17 digits."""
+BODY_STRUCTURE = BodyStructure(max_values=20 * (1 + MAX_LIGHTS) * MAX_KEYFRAMES)
+"""Structure of a request: a keyframe has 17 values."""
 
 Point = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3, description="x, y, z, metres, y up")]
 ColourComponent = Annotated[FiniteFloat, Field(ge=0.0, le=100.0)]
@@ -58,8 +67,8 @@ class LightKeyframe(_Keyframe):
         return [*self.position, *self.colour, self.intensity]
 
 
-Camera = Annotated[list[CameraKeyframe], Field(min_length=1, max_length=MAX_KEYFRAMES)]
-Light = Annotated[list[LightKeyframe], Field(min_length=1, max_length=MAX_KEYFRAMES)]
+Camera = Annotated[list[CameraKeyframe], Field(fail_fast=True, min_length=1, max_length=MAX_KEYFRAMES)]
+Light = Annotated[list[LightKeyframe], Field(fail_fast=True, min_length=1, max_length=MAX_KEYFRAMES)]
 
 
 class Staging(BaseModel):
@@ -67,7 +76,29 @@ class Staging(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     camera: Camera | None = None
-    lights: Annotated[list[Light], Field(max_length=MAX_LIGHTS)] | None = None
+    lights: Annotated[list[Light], Field(fail_fast=True, max_length=MAX_LIGHTS)] | None = None
+
+
+def parse_staging(body: bytes) -> Staging:
+    """Parse a request in JSON; raise `ProblemError` with the invalid field."""
+    try:
+        staging = Staging.model_validate(decode_json(body, BODY_STRUCTURE))
+        check_keyframe_order(staging)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise invalid_field_problem(first["loc"], first["msg"]) from None
+    except KeyframeOrderError as error:
+        raise ProblemError(422, "Out of order", str(error), field=error.field) from None
+    if staging.camera is None and staging.lights is None:
+        detail = "the request has neither a camera nor lights; send at least one of them"
+        raise ProblemError(422, "Nothing to add", detail, field="camera")
+    return staging
+
+
+def digest_staging(body: BodySource, motion_id: str) -> bytes:
+    """Return the digest of the motion with the camera and lights of a request; raise `ProblemError`."""
+    staging = parse_staging(read_body(body))
+    return derive_digest(motion_id, f" staged {staging.model_dump_json()}".encode())
 
 
 class KeyframeOrderError(ValueError):

@@ -8,7 +8,7 @@ from pathlib import Path, PurePath
 
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.job_queue import JobDetails, UploadJob
-from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.ingest.motion_id import derive_job_id, derive_motion_id
 from bunraku.ingest.persistence import StoreOutcome, store_motion
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import require_result
@@ -21,7 +21,8 @@ from bunraku.runtime.display_text import clean_text
 def create_motion_job(digest: bytes, filename: str, subject: str) -> UploadJob:
     """Describe the job for a motion file with this SHA-256 digest."""
     motion_id, filename = derive_motion_id(digest), clean_filename(filename)
-    return UploadJob(motion_id, {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject})
+    job_id = derive_job_id(motion_id, subject)
+    return UploadJob(job_id, {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject})
 
 
 class MotionOperation:
@@ -45,7 +46,7 @@ class MotionOperation:
         known = await self._context.catalogue.get_motion(motion_id)
         if known is not None and await self._context.motion_store.get(motion_id) is not None:
             return StoreOutcome(known, False)
-        async with self._worker_slots:
+        async with self._worker_slots.hold(source.subject):
             progress.advance_to("reading")
             outcome = await self._worker_slots.run_job(
                 JobKind.MOTION,

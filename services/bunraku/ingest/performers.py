@@ -9,10 +9,11 @@ from typing import Annotated, Any
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from bunraku.codec.container import StoredMotion
+from bunraku.http.admission import AdmissionLimit
 from bunraku.http.problem_details import invalid_field_problem
-from bunraku.ingest.admission import AdmissionLimit
 from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
 from bunraku.ingest.job_process import JobKind
+from bunraku.ingest.motion_id import derive_digest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
@@ -21,6 +22,10 @@ from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import MAX_NAME_CHARACTERS, clean_text
 from bunraku.storage.record import CatalogueEntry
 from bunraku.wire.limbs import MAX_PERFORMERS
+
+MAX_EDITS = 16
+"""Performer edits in progress at the same time; further ones get 503."""
+MAX_EDITS_PER_SUBJECT = 4
 
 
 class PerformersRequest(BaseModel):
@@ -49,7 +54,7 @@ class PerformersOperation:
         self._derived_motions = DerivedMotionFactory(context, worker_slots)
         self._worker_slots = worker_slots
         self._timeout_s = context.settings.upload_seconds
-        self._limit = AdmissionLimit("performer edits")
+        self._limit = AdmissionLimit("performer edits", MAX_EDITS, MAX_EDITS_PER_SUBJECT)
 
     async def add_performers(self, motion_id: str, request: PerformersRequest, subject: str = "") -> StoreOutcome:
         """Derive a motion with the requested performers, stored by `subject`; raise `ProblemError`."""
@@ -75,9 +80,10 @@ class PerformersOperation:
                 "rates": combined_ladder([entry.description["rates"] for entry in (base, *others)]),
             }
 
-        key = f" performed with {json.dumps([request.motions, request.places])}".encode()
-        with self._limit:
-            return await self._derived_motions.find_or_create(Derivation(motion_id, key, run, describe, subject))
+        addition = f" performed with {json.dumps([request.motions, request.places])}".encode()
+        digest = derive_digest(motion_id, addition)
+        with self._limit.admit(subject):
+            return await self._derived_motions.find_or_create(Derivation(motion_id, digest, run, describe, subject))
 
 
 def performer_motion_names(entry: CatalogueEntry) -> list[str]:

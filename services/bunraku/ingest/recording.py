@@ -7,11 +7,12 @@ import secrets
 from typing import Any
 
 import msgpack
+import numpy as np
 from pydantic import ValidationError
 
 from bunraku.codec.container import StoredMotion
+from bunraku.http.admission import AdmissionLimit
 from bunraku.http.problem_details import invalid_field_problem
-from bunraku.ingest.admission import AdmissionLimit
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.motion_id import derive_motion_id
@@ -27,6 +28,7 @@ from bunraku.storage.record import CatalogueEntry
 RECORDING_SUBJECT = "ingest.keep"
 MAX_ACTIVE_RECORDINGS = 8
 """Recordings in progress at the same time; further ones get 503."""
+MAX_RECORDINGS_PER_SUBJECT = 2
 RECORDING_TIMEOUT_S = 100.0
 """Time limit of a recording, including the wait for a worker slot: the session service waits for 120 s."""
 INHERITED_FIELDS = ("profile", "joints", "rest_pose", "unit", "guessed", "fit")
@@ -46,7 +48,7 @@ class RecordingOperation:
     ) -> None:
         self._context = context
         self._worker_slots = worker_slots
-        self._limit = AdmissionLimit("recordings", max_active)
+        self._limit = AdmissionLimit("recordings", max_active, MAX_RECORDINGS_PER_SUBJECT)
         self._timeout_s = timeout_s
 
     async def handle_message(self, message: bytes) -> bytes:
@@ -67,7 +69,7 @@ class RecordingOperation:
 
     async def record_session(self, request: RecordingRequest) -> CatalogueEntry:
         """Record an interval of a session as a motion and store it; raise `ProblemError`."""
-        with self._limit:
+        with self._limit.admit(request.subject):
             try:
                 async with asyncio.timeout(self._timeout_s):
                     return await self._record_session(request)
@@ -82,7 +84,7 @@ class RecordingOperation:
         await check_quota(self._context, request.subject)
         motions = await self._load_motions(log)
         motion_id = derive_motion_id(secrets.token_bytes(32))
-        async with self._worker_slots:
+        async with self._worker_slots.hold(request.subject):
             outcome = await self._worker_slots.run_job(
                 JobKind.RECORDING, (motion_id, request, log, motions), self._timeout_s
             )
@@ -134,6 +136,12 @@ def parse_recording_request(message: bytes) -> RecordingRequest:
     if request.frame_count > MAX_RECORDING_S * RECORDING_FPS:
         detail = f"a recording has at most {MAX_RECORDING_S} seconds"
         raise ProblemError(422, "Too long", detail, field="seconds", hint="record a shorter part")
-    if any(after[0] <= before[0] for before, after in zip(request.camera, request.camera[1:], strict=False)):
+    try:
+        camera = request.camera_keyframes
+    except ValueError as error:
+        raise ProblemError(422, "Invalid request", f"camera: {error}", field="camera") from None
+    if not np.isfinite(camera).all():
+        raise ProblemError(422, "Invalid request", "camera: the values must be finite numbers", field="camera")
+    if not (np.diff(camera[:, 0]) > 0.0).all():
         raise ProblemError(422, "Invalid request", "camera: the times of keyframes must ascend", field="camera")
     return request

@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Callable
-from typing import Any, Literal
+from collections import Counter
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
 
 from bunraku.ingest import job_process
 from bunraku.ingest.job_process import JobKind
@@ -19,25 +21,61 @@ MAX_RUNNING_JOBS = 2
 _log = logging.getLogger(__name__)
 
 
-class WorkerSlots(asyncio.Semaphore):
-    """Worker slots of one replica. Acquire one before `run_job`."""
+class WorkerSlots:
+    """Worker slots of one replica. Hold one while calling `run_job`.
+
+    One subject holds at most all slots but one, and a free slot goes to the subject that holds the fewest: the jobs of
+    one subject do not delay those of others.
+    """
 
     def __init__(self, count: int = MAX_RUNNING_JOBS, clock: Callable[[], float] = time.perf_counter) -> None:
         """`clock` measures the durations of jobs, in seconds."""
-        super().__init__(count)
+        self._count = count
         self._clock = clock
-        self.waiting_jobs = 0
-        """Jobs that wait for a slot."""
+        self._held = Counter[str]()
+        self._waiters: list[tuple[str, asyncio.Future[None]]] = []
         self.running_jobs = 0
         self.durations = LabelledHistograms()
         """Durations of jobs by kind and outcome."""
 
-    async def acquire(self) -> Literal[True]:
-        self.waiting_jobs += 1
+    @property
+    def waiting_jobs(self) -> int:
+        """Number of jobs that wait for a slot."""
+        return len(self._waiters)
+
+    def locked(self) -> bool:
+        """Return whether all slots are held."""
+        return self._held.total() >= self._count
+
+    @asynccontextmanager
+    async def hold(self, subject: str) -> AsyncIterator[None]:
+        """Hold a slot during the block, for a job of `subject`; an empty one is nobody in particular."""
+        granted: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        self._waiters.append((subject, granted))
+        self._grant_slots()
         try:
-            return await super().acquire()
+            await granted
+            yield
         finally:
-            self.waiting_jobs -= 1
+            if granted.done() and not granted.cancelled():
+                self._held[subject] -= 1
+                self._grant_slots()
+            else:
+                self._waiters.remove((subject, granted))
+
+    def _grant_slots(self) -> None:
+        """Give free slots to waiting jobs: in the order of arrival among subjects that hold equally many."""
+        while not self.locked():
+            permitted = [one for one in self._waiters if not one[1].done() and self._may_hold_another(one[0])]
+            if not permitted:
+                return
+            subject, granted = waiter = min(permitted, key=lambda one: self._held[one[0]])
+            self._waiters.remove(waiter)
+            self._held[subject] += 1
+            granted.set_result(None)
+
+    def _may_hold_another(self, subject: str) -> bool:
+        return not subject or self._held[subject] < max(self._count - 1, 1)
 
     async def run_job(
         self,

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
 RECORDING_FPS = 60
 """Frame rate of a recorded motion, the rate at which viewers render."""
@@ -17,8 +19,12 @@ MAX_RECORDING_S = 600
 MAX_CAMERA_KEYFRAMES = 36_001
 """Maximum number of camera keyframes: one per frame of the longest recording."""
 
+CAMERA_VALUES = 8
+"""Values of a camera keyframe: clock time (microseconds), position and gaze point (metres), vertical field of view
+(radians)."""
+CAMERA_DTYPE = np.dtype("<f8")
+
 ClockTime = Annotated[int, Field(ge=0, lt=1 << 53)]
-KeyframeValues = Annotated[list[FiniteFloat], Field(min_length=8, max_length=8)]
 
 
 class RecordingRequest(BaseModel):
@@ -35,11 +41,20 @@ class RecordingRequest(BaseModel):
     """Start of the interval, clock time in microseconds."""
     end: ClockTime
     """End of the interval, clock time in microseconds."""
-    camera: Annotated[list[KeyframeValues], Field(max_length=MAX_CAMERA_KEYFRAMES)] = []
-    """Keyframes in ascending order of clock time: time (microseconds), position and gaze point (metres), vertical field
-    of view (radians)."""
+    camera: Annotated[bytes, Field(max_length=MAX_CAMERA_KEYFRAMES * CAMERA_VALUES * CAMERA_DTYPE.itemsize)] = b""
+    """Camera keyframes by `pack_camera`."""
+
+    @property
+    def camera_keyframes(self) -> NDArray[np.float64]:
+        """Keyframes of the camera (n, `CAMERA_VALUES`); raises ValueError for an incomplete one."""
+        return np.frombuffer(self.camera, CAMERA_DTYPE).reshape(-1, CAMERA_VALUES).astype(np.float64)
 
     @property
     def frame_count(self) -> int:
         """Number of frames of the complete interval."""
         return max(round((self.end - self.begin) * RECORDING_FPS / 1e6), 0)
+
+
+def pack_camera(keyframes: ArrayLike) -> bytes:
+    """Return keyframes (n, `CAMERA_VALUES`), in ascending order of time, as bytes: parsing them takes no time."""
+    return np.asarray(keyframes, CAMERA_DTYPE).tobytes()

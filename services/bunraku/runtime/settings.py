@@ -64,7 +64,7 @@ class Settings(BaseSettings):
     connects: float = 50.0
     """WebSocket connections that one address may open per second, with bursts of ten times as many; 0: unlimited."""
     body_seconds: float = 30.0
-    """Time limit for the body of a request, plus one second for each 1,000 bytes."""
+    """Time window of request bodies: in each, a body must end or bring 500 bytes per second."""
     quota_motions: int = 500
     """Maximum number of motions of one subject; 0: unlimited. Effective with a secret."""
     quota_bytes: int = 1 << 30

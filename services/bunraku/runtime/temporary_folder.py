@@ -24,9 +24,9 @@ LOCK_FILE = "owner"
 """Name of the lock file in a temporary folder."""
 UNLOCKED_LIFETIME_S = 86_400.0
 """Age from which a folder without a lock file is removed, as older releases leave it, in seconds."""
-_NAME_PATTERN = re.compile(r"bunraku-(upload|job|demo|workers)-[a-z0-9_]{8}")
+_NAME_PATTERN = re.compile(r"bunraku-(upload|job|body|demo|workers)-[a-z0-9_]{8}")
 
-Purpose = Literal["upload", "job", "demo", "workers"]
+Purpose = Literal["upload", "job", "body", "demo", "workers"]
 
 
 @contextmanager

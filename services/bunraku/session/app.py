@@ -8,27 +8,30 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Annotated, Any
 
-from fastapi import FastAPI, Query, Request, WebSocket
+from fastapi import Depends, FastAPI, Query, Request, WebSocket
 from fastapi.responses import JSONResponse
 from starlette.requests import HTTPConnection
 from starlette.websockets import WebSocketDisconnect
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Access, Role, access_of, requires
+from bunraku.http.large_body import BodySource, LargeBodies
+from bunraku.http.openapi import request_body
+from bunraku.runtime import worker_process
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.session import control_endpoint, metrics, recorder
-from bunraku.session.recorder import Recording
+from bunraku.session.recording import MAX_BODY_BYTES, PackedRecording, Recording, parse_recording
 from bunraku.session.schema import NewSession, SessionEdit
 from bunraku.session.session_manager import SessionManager
 
-MAX_RECORDING_BODY_BYTES = 16 << 20
-"""Largest request: the keyframes of a camera."""
+worker_process.preload_modules("bunraku.session.recording")
 
 
 def create_app(context: ServiceContext) -> FastAPI:
     """Create the service."""
     sessions = SessionManager(context)
+    recording_bodies = LargeBodies("recordings", records=(PackedRecording,))
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -88,11 +91,19 @@ def create_app(context: ServiceContext) -> FastAPI:
         _require_unbound(access_of(request))
         await sessions.stage_proxy(session).end()
 
-    @app.post("/v1/sessions/{session}/recordings", status_code=201, tags=["sessions"])
-    @requires(Role.INGEST, max_body_bytes=MAX_RECORDING_BODY_BYTES)
-    async def record(session: str, recording: Recording, request: Request) -> JSONResponse:
+    @app.post(
+        "/v1/sessions/{session}/recordings",
+        status_code=201,
+        tags=["sessions"],
+        openapi_extra=request_body(Recording),
+    )
+    @requires(Role.INGEST, max_body_bytes=MAX_BODY_BYTES)
+    async def record(
+        session: str, request: Request, body: BodySource = Depends(recording_bodies.receive)
+    ) -> JSONResponse:
         """Store the shown motion with the controlled limbs as a new motion, with a camera if one is given."""
         subject = access_of(request).subject
+        recording = await recording_bodies.process(parse_recording, body)
         motion = await recorder.record_session(sessions.stage_proxy(session), recording, context, subject)
         return JSONResponse(motion, 201, {"Location": f"/v1/motions/{motion['id']}"})
 

@@ -14,7 +14,7 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbInput
-from bunraku.messaging.recording_request import RecordingRequest
+from bunraku.messaging.recording_request import RecordingRequest, pack_camera
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore, SceneBlockStore
@@ -129,7 +129,9 @@ def test_camera_keyframes_become_a_track() -> None:
         [START_CLOCK_US + SECOND_US // 2, 0.0, 1.0, 4.0, 0.0, 1.0, 0.0, 0.5],
         [START_CLOCK_US + SECOND_US, 1.0, 1.5, 3.0, 0.2, 1.0, 0.0, 0.7],
     ]
-    request = RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 3 * SECOND_US // 2, camera=keys)
+    request = RecordingRequest(
+        log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 3 * SECOND_US // 2, camera=pack_camera(keys)
+    )
     result = encode_recording("recorded", request, make_log(one), MOTIONS)
     motion, _ = unpack_recording(result)
     assert isinstance(result, JobResult)
@@ -210,7 +212,7 @@ def test_invalid_camera_is_rejected() -> None:
     wide = [[float(START_CLOCK_US), 0.0, 1.0, 4.0, 0.0, 1.0, 0.0, 4.0]]
     rejected = encode_recording(
         "recorded",
-        RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + SECOND_US, camera=wide),
+        RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + SECOND_US, camera=pack_camera(wide)),
         make_log(one),
         MOTIONS,
     )
@@ -221,6 +223,6 @@ def test_invalid_camera_is_rejected() -> None:
 
 def test_camera_is_constant_outside_its_keyframes() -> None:
     keys = [[10.0, *np.arange(6.0), 0.5], [20.0, *np.arange(6.0) + 1, 0.7]]
-    values = sample_camera(keys, [0, 10, 15, 20, 99]).values
+    values = sample_camera(np.array(keys), [0, 10, 15, 20, 99]).values
     np.testing.assert_allclose(values[:, 0], [0, 0, 0.5, 1, 1])
     np.testing.assert_allclose(values[:, 6], [0.5, 0.5, 0.6, 0.7, 0.7])

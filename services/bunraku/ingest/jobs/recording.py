@@ -18,7 +18,8 @@ from bunraku.ingest.jobs.motion import FIRST_BLOCK_S, MAX_BEST_GRADE_FRAMES
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.input_log import CorruptInputLog, InputLog
-from bunraku.messaging.recording_request import RECORDING_FPS, KeyframeValues, RecordingRequest
+from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
+from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion
 
 
@@ -63,7 +64,9 @@ def encode_recording(
     ]
     try:
         scenes = (
-            [encode_scene(sample_camera(request.camera, times), first_seconds=FIRST_BLOCK_S)] if request.camera else []
+            [encode_scene(sample_camera(request.camera_keyframes, times), first_seconds=FIRST_BLOCK_S)]
+            if request.camera
+            else []
         )
     except ValueError as error:
         return JobRejection("Invalid camera", str(error), field="camera")
@@ -106,11 +109,10 @@ def _encode_performers(
     return encoded
 
 
-def sample_camera(keyframes: Sequence[KeyframeValues], times: Sequence[int]) -> SceneSamples:
-    """Sample a camera at clock `times`: linear between keyframes, constant before the first and after the last.
+def sample_camera(keys: Array, times: Sequence[int]) -> SceneSamples:
+    """Sample a camera with keyframes (n, 8) at clock `times`: linear in between, constant before and after them.
 
     Raise ValueError for invalid values.
     """
-    keys = np.array(keyframes, dtype=np.float64)
     values = np.stack([np.interp(np.array(times, dtype=np.float64), keys[:, 0], column) for column in keys.T[1:]], 1)
     return SceneSamples("camera", float(RECORDING_FPS), values)

@@ -9,8 +9,9 @@ import numpy as np
 from bunraku.codec.container import StoredMotion, replace_scene_tracks
 from bunraku.codec.scene import SceneKind, SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
+from bunraku.http.large_body import BodySource, read_body
 from bunraku.ingest.jobs.motion import FIRST_BLOCK_S
-from bunraku.ingest.keyframe import CameraKeyframe, LightKeyframe, Staging
+from bunraku.ingest.keyframe import CameraKeyframe, LightKeyframe, Staging, parse_staging
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion.easing import minimum_jerk
 from bunraku.motion.rotation import Array
@@ -37,6 +38,13 @@ def sample_keyframes(kind: SceneKind, keyframes: Keyframes, duration_us: int) ->
     share: Array = np.clip((times - start) / (key_times[following] - start), 0.0, 1.0)
     share = np.where(is_smooth[following], minimum_jerk(share), share)[:, None]
     return SceneSamples(kind, SCENE_FPS, values[following - 1] + share * (values[following] - values[following - 1]))
+
+
+def add_scene_of_body(
+    motion_id: str, stored: StoredMotion, body: BodySource, on_progress: Callable[[float], None] = lambda _: None
+) -> JobResult | JobRejection:
+    """Call `add_scene` with the camera and lights of a request's body."""
+    return add_scene(motion_id, stored, parse_staging(read_body(body)), on_progress)
 
 
 def add_scene(
