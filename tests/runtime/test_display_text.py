@@ -4,7 +4,7 @@ import json
 import unicodedata
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from bunraku.runtime.display_text import MAX_COMBINING_MARKS, clean_document, clean_text, escape_text
@@ -88,6 +88,7 @@ def test_truncation_does_not_split_a_character() -> None:
 
 
 @given(ANY_TEXT)
+@example("0 \u200e 0")
 def test_cleaned_text_is_normal_bounded_encodable_and_stable(text: str) -> None:
     cleaned = clean_text(text, 40)
     assert len(cleaned) <= 40

@@ -56,7 +56,8 @@ def clean_text(text: str, max_characters: int = MAX_NAME_CHARACTERS) -> str:
     loses some of its marks or joined parts.
     """
     text = _SPACES.sub(" ", _ESCAPE_SEQUENCE.sub("", text))
-    safe = "".join(char for char, is_safe in _judge(text) if is_safe)
+    # spaces again, as those around a removed character meet
+    safe = _SPACES.sub(" ", "".join(char for char, is_safe in _judge(text) if is_safe))
     return _truncate(unicodedata.normalize("NFC", safe).strip(), max_characters).strip()
 
 
