@@ -192,8 +192,9 @@ async def test_edit_at_a_replica_that_lost_the_session_is_refused(
     stalled._running.cancel()
     await asyncio.wait((stalled._running,))
     await published.wait_for(TimelineState)
+    stage = stalled.sessions._endpoints[opened["id"]].stage
     with pytest.raises(ProblemError) as refused:
-        await stalled.sessions.save_record(stalled.sessions._endpoints[opened["id"]].stage)
+        await stalled.sessions.save_record(stage, stage.timeline)
     assert refused.value.status == 503
     assert (await surviving.sessions.stage_proxy(opened["id"]).describe())["id"] == opened["id"]
     assert opened["id"] not in stalled.sessions._endpoints

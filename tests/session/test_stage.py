@@ -24,6 +24,7 @@ from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
+from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import (
     EDIT_LEAD_US,
     FRAME_INTERVAL_US,
@@ -31,6 +32,7 @@ from bunraku.session.stage import (
     PRESENCE_BURST,
     SessionStart,
     Stage,
+    load_bend_tables,
 )
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
@@ -163,10 +165,21 @@ async def test_overlays_have_only_controlled_limbs_and_end_with_an_empty_one(sta
     assert overlays[-1].limbs == {}
 
 
+async def change_motion(stage: Stage, motion: StoredMotion) -> None:
+    """Change the motion as the stage's endpoint does."""
+    await asyncio.to_thread(load_bend_tables, motion)
+    state = stage.plan_edit(SessionEdit(motion=motion.id), motion)
+    assert state is not None
+    stage.apply_edit(state, motion)
+
+
 async def test_edit_applies_after_the_lead_time(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     before = stage.timeline
-    stage.edit_timeline(playing=False, position=None, loop=None)
+    planned = stage.plan_edit(SessionEdit(playing=False), None)
+    assert planned is not None
+    assert stage.timeline is before
+    stage.apply_edit(planned, None)
     (state,) = await audience.wait_for(1, TimelineState)
     assert isinstance(state, TimelineState)
     assert (state.epoch, state.playing) == (before.epoch + 1, False)
@@ -180,7 +193,7 @@ async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: Memory
     stage.receive(aiko.puppeteer, Claim(3))
     async with keep_holding(stage, aiko, 3):
         await audience.wait_for(2, Overlay)
-        await stage.change_motion(two)
+        await change_motion(stage, two)
         assert stage.timeline.motion == "two"
         assert stage.presence.limbs[3] == aiko.id
         count = len(await audience.wait_for(1, Overlay))
@@ -321,7 +334,7 @@ async def test_one_overlay_has_the_limbs_of_all_performers(bus: MemoryBus) -> No
     ]
     # Ben loses the leg of the removed second performer; Aiko keeps her hand
     async with keep_holding(stage, aiko, 1):
-        await stage.change_motion(await stored_motion("two", 6))
+        await change_motion(stage, await stored_motion("two", 6))
     assert stage.presence.limbs == [None, aiko.id, None, None]
     assert Refusal(6, "lost") in map(unpack, ben.received)
     await audience.wait_for(1, TimelineState)

@@ -19,7 +19,7 @@ from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
-from bunraku.wire.messages import Claim
+from bunraku.wire.messages import Claim, TimelineState
 from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.vectors.blocks import random_motion
 
@@ -29,13 +29,19 @@ class FakeStageOwner:
 
     def __init__(self) -> None:
         self.saved: list[bytes] = []
+        self.shown: list[bytes] = []
+        """Timeline of the stage at each time it was saved."""
+        self.fails = False
         self.ended: list[str] = []
 
     async def load_motion(self, motion: str) -> StoredMotion:
         raise ProblemError(404, "No such motion", motion)
 
-    async def save_record(self, stage: Stage) -> None:
-        self.saved.append(stage.timeline.pack())
+    async def save_record(self, stage: Stage, state: TimelineState) -> None:
+        self.saved.append(state.pack())
+        self.shown.append(stage.timeline.pack())
+        if self.fails:
+            raise ProblemError(503, "Session elsewhere", "another server has taken over this session")
 
     async def end_session(self, session: str) -> None:
         self.ended.append(session)
@@ -74,12 +80,26 @@ async def join_stage(
     return stage, connection
 
 
-async def test_edit_is_saved_before_it_is_acknowledged(
+async def test_edit_that_cannot_be_saved_is_not_shown(
+    context: ServiceContext, endpoint: StageEndpoint, owner: FakeStageOwner
+) -> None:
+    owner.fails, before = True, endpoint.stage.timeline
+    published: list[bytes] = []
+    context.bus.subscribe("session.s.timeline", published.append)
+    with pytest.raises(ProblemError, match="taken over"):
+        await StageProxy("s", context.bus, context.key_values).edit(SessionEdit(playing=False))
+    assert endpoint.stage.timeline is before
+    assert published == []
+
+
+async def test_edit_is_saved_before_it_is_shown_and_acknowledged(
     context: ServiceContext, endpoint: StageEndpoint, owner: FakeStageOwner
 ) -> None:
     stage = StageProxy("s", context.bus, context.key_values)
+    before = endpoint.stage.timeline.pack()
     await stage.edit(SessionEdit(playing=False))
     assert owner.saved == [endpoint.stage.timeline.pack()]
+    assert owner.shown == [before]
     assert not endpoint.stage.timeline.playing
     await stage.end()
     assert owner.ended == ["s"]

@@ -27,6 +27,7 @@ from bunraku.session.session_registry import RegisteredSession, SessionLost, Ses
 from bunraku.session.stage import SessionStart, Stage, load_bend_tables
 from bunraku.session.stage_endpoint import StageEndpoint, session_json
 from bunraku.session.stage_proxy import StageProxy
+from bunraku.wire.messages import TimelineState
 
 MAX_SESSIONS = 1_000
 """Sessions of one replica."""
@@ -138,15 +139,17 @@ class SessionManager:
             raise ProblemError(404, "No such motion", f"there is no motion {motion[:40]!r}", field="motion")
         return stored
 
-    async def save_record(self, stage: Stage) -> None:
-        """Save the state of a stage; raises `ProblemError` if the session has ended or another replica owns it now."""
+    async def save_record(self, stage: Stage, state: TimelineState) -> None:
+        """Save a stage with its next timeline.
+
+        Raises `ProblemError` if the session has ended or another replica owns it now.
+        """
         endpoint = self._require_endpoint(stage.id)
         async with endpoint.record_lock:
             self._require_endpoint(stage.id)
             try:
-                endpoint.revision = await self._registry.save(
-                    stage.id, _record_of(stage, self._registry.replicas.id), endpoint.revision
-                )
+                record = SessionRecord(self._registry.replicas.id, stage.created, state.pack(), stage.subject)
+                endpoint.revision = await self._registry.save(stage.id, record, endpoint.revision)
             except SessionLost as lost:
                 await self._close_stage(stage.id)
                 raise _lost_problem(lost) from None
@@ -197,7 +200,7 @@ class SessionManager:
                 # first, so that no other replica has the stage as well
                 await self._close_stage(session)
                 with contextlib.suppress(SessionLost, BackendUnavailable):
-                    await self._registry.save(session, _record_of(endpoint.stage, NO_REPLICA), endpoint.revision)
+                    await self._registry.save(session, _record_of(endpoint.stage), endpoint.revision)
                     self.counters.sessions["handed on",] += 1
         self._registry.close()
         await self._registry.replicas.close()
@@ -363,8 +366,9 @@ class SessionManager:
             await endpoint.close()
 
 
-def _record_of(stage: Stage, owner: str) -> SessionRecord:
-    return SessionRecord(owner, stage.created, stage.timeline.pack(), stage.subject)
+def _record_of(stage: Stage) -> SessionRecord:
+    """Return the record of a session without an owner."""
+    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject)
 
 
 def _lost_problem(lost: SessionLost) -> ProblemError:

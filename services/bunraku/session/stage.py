@@ -30,6 +30,7 @@ from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
+from bunraku.session.schema import SessionEdit
 from bunraku.session.stall import EventLoopStallCompensation
 from bunraku.session.viewer_counts import ViewerCounts
 from bunraku.wire import messages
@@ -173,28 +174,36 @@ class Stage:
         asks = [list(limb) for limb in self._ownership.asks()]
         return Presence(self._viewer_counts.total, puppeteers, list(self.holders), asks)
 
-    def edit_timeline(self, *, playing: bool | None, position: int | None, loop: bool | None) -> TimelineState:
-        """Edit the timeline for everyone, `EDIT_LEAD_US` from now."""
-        due = self._clock() + EDIT_LEAD_US
-        return self._publish_timeline(timeline.edit(self.timeline, due, playing=playing, position=position, loop=loop))
+    def plan_edit(self, edit: SessionEdit, motion: StoredMotion | None) -> TimelineState | None:
+        """Return the timeline after an edit, due `EDIT_LEAD_US` from now; None if the edit changes nothing.
 
-    async def change_motion(self, motion: StoredMotion) -> TimelineState:
-        """Change the motion for everyone, from its start; limbs stay held."""
-        # the first arm of its proportions takes a tenth of a second, in which the event loop must not block
-        await asyncio.to_thread(load_bend_tables, motion)
-        now, before = self._clock(), self.holders
+        A new `motion` begins at its start. Save the timeline, then pass it to `apply_edit`.
+        """
+        due, state = self._clock() + EDIT_LEAD_US, self.timeline
+        if motion is not None:
+            state = timeline.change_motion(state, due, motion.id, motion.first_track.duration_us)
+        if (edit.playing, edit.position, edit.loop) != (None, None, None):
+            state = timeline.edit(state, due, playing=edit.playing, position=edit.position, loop=edit.loop)
+        return state if state is not self.timeline else None
+
+    def apply_edit(self, state: TimelineState, motion: StoredMotion | None) -> None:
+        """Publish a timeline of `plan_edit`, and change the motion for everyone; limbs stay held.
+
+        Call `load_bend_tables` for a new `motion` before, as its first arm takes a tenth of a second.
+        """
+        before = self.holders
+        if motion is not None:
+            self._change_motion(motion)
+        self._publish_timeline(state)
+        if len(self.holders) != len(before):
+            self._publish_presence()
+
+    def _change_motion(self, motion: StoredMotion) -> None:
+        now = self._clock()
         for limb, holder in self._marionettes.set_figures(_performer_figures(motion), motion.id, now):
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
         self._set_motion(motion)
-        state = self._publish_timeline(
-            timeline.change_motion(
-                self.timeline, self._clock() + EDIT_LEAD_US, motion.id, motion.first_track.duration_us
-            )
-        )
-        if len(self.holders) != len(before):
-            self._publish_presence()
-        return state
 
     def join(
         self, puppeteer_id: str, name: str, send: Callable[[bytes], None], subject: str | None = None
@@ -281,11 +290,10 @@ class Stage:
     def _set_motion(self, motion: StoredMotion) -> None:
         self._pose_cache = PoseCache(motion, self._timelines)
 
-    def _publish_timeline(self, state: TimelineState) -> TimelineState:
+    def _publish_timeline(self, state: TimelineState) -> None:
         self._timelines.put(state)
         self.log.add_timeline(state)
         self._bus.publish(f"session.{self.id}.timeline", state.pack())
-        return state
 
     def _publish_presence(self) -> None:
         """Publish the presence, or together with later changes if there were many just now."""

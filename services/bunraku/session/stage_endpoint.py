@@ -25,8 +25,8 @@ from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit
-from bunraku.session.stage import Stage
-from bunraku.wire.messages import unpack
+from bunraku.session.stage import Stage, load_bend_tables
+from bunraku.wire.messages import TimelineState, unpack
 
 PUPPETEER_HEARTBEAT_S = 2.0
 """Interval between the heartbeats that a replica sends for a puppeteer."""
@@ -46,8 +46,8 @@ class StageOwner(Protocol):
     async def load_motion(self, motion: str) -> StoredMotion:
         """Return a motion; raises `ProblemError`."""
 
-    async def save_record(self, stage: Stage) -> None:
-        """Save the state of a stage, so that another replica can continue it."""
+    async def save_record(self, stage: Stage, state: TimelineState) -> None:
+        """Save a stage with its next timeline, so that another replica can continue it."""
 
     async def end_session(self, session: str) -> None:
         """End a session."""
@@ -64,6 +64,8 @@ class StageEndpoint:
         """Lock of the record, held by the one request or task that changes it."""
         self._context = context
         self._clock = context.clock
+        # each edit begins with the timeline of the one before it
+        self._edit_lock = asyncio.Lock()
         self._owner = owner
         self._subject = f"session.{stage.id}"
         self._join_rate = KeyedTokenBuckets(JOINS_PER_S, JOIN_BURST)
@@ -115,11 +117,16 @@ class StageEndpoint:
 
     async def _answer_edit(self, values: dict[str, Any]) -> dict[str, Any]:
         edit, stage = SessionEdit.model_validate(values), self.stage
-        if edit.motion is not None and edit.motion != stage.timeline.motion:
-            await stage.change_motion(await self._owner.load_motion(edit.motion))
-        if (edit.playing, edit.position, edit.loop) != (None, None, None):
-            stage.edit_timeline(playing=edit.playing, position=edit.position, loop=edit.loop)
-        await self._owner.save_record(stage)
+        async with self._edit_lock:
+            motion = None
+            if edit.motion is not None and edit.motion != stage.timeline.motion:
+                motion = await self._owner.load_motion(edit.motion)
+                await asyncio.to_thread(load_bend_tables, motion)
+            state = stage.plan_edit(edit, motion)
+            # saved before it is shown: a server that takes over continues what viewers have seen
+            await self._owner.save_record(stage, state or stage.timeline)
+            if state is not None:
+                stage.apply_edit(state, motion)
         return session_json(stage, self._clock())
 
     async def _answer_log(self, seconds: float | None) -> dict[str, Any]:
