@@ -16,6 +16,7 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.session import recorder
 from bunraku.session.recording import PackedRecording
 from bunraku.session.schema import SessionEdit
+from bunraku.storage.removal import remove_motion
 from tests.simulation.library import SOURCE_FILES, STORED_MOTIONS, source_motion_id
 from tests.simulation.link import LinkQuality
 from tests.simulation.model import Model, MotionModel, SessionState
@@ -217,9 +218,7 @@ class Operations:
         motion.is_promised = False
 
         async def remove() -> bool:
-            removed = await context.catalogue.remove_motion(motion_id)
-            if removed:
-                await context.motion_store.remove(motion_id)
+            await remove_motion(context.catalogue, context.motion_store, motion_id)
             return True
 
         await self._call(f"remove {motion_id}", replica, remove, self._world.note)

@@ -59,6 +59,10 @@ class NodeObjects:
         await self._access()
         self._disk.objects.pop(path, None)
 
+    async def sizes(self, paths: list[str]) -> list[int | None]:
+        await self._access()
+        return [None if (data := self._disk.objects.get(path)) is None else len(data) for path in paths]
+
     async def check(self) -> None:
         self._node.require_alive()
 
