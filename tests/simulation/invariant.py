@@ -33,7 +33,7 @@ POSE_AGE_US = 150_000
 MAX_CLOCK_ERROR_US = 45_000
 """Error of a viewer's reference clock: half of the longest round trip, and the skew between servers."""
 POSE_TOLERANCE = 1e-9
-OVERLAY_TOLERANCE = 0.05
+OVERLAY_TOLERANCE = 0.1
 """Difference of quaternions: a viewer on a constrained link interpolates between every second frame of an overlay."""
 
 

@@ -62,7 +62,8 @@ class WatchedSession:
         self._context = context
         self._subject = f"session.{session}"
         self.sync_groups = SyncGroups(context)
-        self._viewers: set[ViewerConnection] = set()
+        # in order of arrival, so that a simulation is the same each time
+        self._viewers: dict[ViewerConnection, None] = {}
         # connections that overlays are written to directly, and the viewers that need a check for each overlay
         self._writable: MulticastGroup | None = None
         self._unwritable: list[ViewerConnection] = []
@@ -114,13 +115,13 @@ class WatchedSession:
         viewer.send_control(self._presence)
         if self._overlay is not None:
             viewer.send_overlay(self._overlay)
-        self._viewers.add(viewer)
+        self._viewers[viewer] = None
         viewer.group = self
         self._writable = None
 
     def remove_viewer(self, viewer: ViewerConnection) -> None:
         """Remove a viewer whose connection has ended."""
-        self._viewers.discard(viewer)
+        self._viewers.pop(viewer, None)
         self._writable = None
         self._publish_count_throttled(len(self._viewers))
         if not self._viewers:
