@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from tests.attack.inspect_storage import check_durability
-from tests.attack.inspection import Inspection, load_inspections
+from tests.attack.inspection import load_inspections
 from tests.attack.lab import Lab, open_lab
 from tests.attack.raw_socket import CLOSED, OPEN, RawSocket, frame
 from tests.attack.registry import Attack, Report, Target, load_attacks
@@ -35,7 +35,6 @@ FIRST_ROW_OF_ANSWERS = 14
 QUICK_ATTACKS = [one for one in load_attacks().values() if one.is_quick]
 LOADS = [one for one in QUICK_ATTACKS if one.row < FIRST_ROW_OF_ANSWERS]
 REQUESTS = [one for one in QUICK_ATTACKS if one.row >= FIRST_ROW_OF_ANSWERS]
-QUICK_INSPECTIONS = [one for one in load_inspections().values() if one.is_quick]
 
 
 @pytest.fixture(scope="module")
@@ -58,14 +57,6 @@ async def test_server_answers_as_specified(lab: Lab, attack: Attack) -> None:
 @pytest.mark.parametrize("attack", LOADS, ids=lambda one: one.name.replace(" ", "-"))
 def test_server_holds_against(lab: Lab, attack: Attack) -> None:
     result = lab.run(attack, SECONDS, MAX_GAP_RATIO, attempts=2)
-    assert result.held, "\n".join(result.violations)
-
-
-@pytest.mark.parametrize("inspection", QUICK_INSPECTIONS, ids=lambda one: one.name.replace(" ", "-"))
-def test_inspected_server_holds(inspection: Inspection) -> None:
-    result = inspection.run()
-    if result.skipped:
-        pytest.skip(result.skipped)
     assert result.held, "\n".join(result.violations)
 
 

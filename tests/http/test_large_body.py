@@ -46,8 +46,9 @@ async def receive(bodies: LargeBodies, request: Request) -> AsyncIterator[BodySo
         yield body
 
 
-def describe_body(source: BodySource, parent: int) -> tuple[int, bool]:
-    return len(read_body(source)), os.getpid() == parent
+def describe_body(source: BodySource, parent: int) -> list[int | bool]:
+    # a worker process passes on plain values: no tuple
+    return [len(read_body(source)), os.getpid() == parent]
 
 
 def reject_body(source: BodySource) -> None:
@@ -66,7 +67,7 @@ async def test_small_body_is_processed_in_this_process() -> None:
     bodies = LargeBodies("batches", max_inline_bytes=INLINE_BYTES)
     async with receive(bodies, make_request(b"x" * 60, b"y" * 40)) as body:
         assert body == b"x" * 60 + b"y" * 40
-        assert await bodies.process(describe_body, body, os.getpid()) == (100, True)
+        assert await bodies.process(describe_body, body, os.getpid()) == [100, True]
     async with receive(bodies, make_request()) as body:
         assert body == b""
 
@@ -76,7 +77,7 @@ async def test_large_body_is_a_file_that_another_process_reads() -> None:
     async with receive(bodies, make_request(b"x" * 60, b"y" * 41, b"z" * 1_000_000)) as body:
         assert isinstance(body, Path)
         assert await asyncio.to_thread(body.read_bytes) == b"x" * 60 + b"y" * 41 + b"z" * 1_000_000
-        assert await bodies.process(describe_body, body, os.getpid()) == (1_000_101, False)
+        assert await bodies.process(describe_body, body, os.getpid()) == [1_000_101, False]
         with pytest.raises(ProblemError, match="1000101 bytes"):
             await bodies.process(reject_body, body)
         with pytest.raises(ProblemError) as raised:
