@@ -25,7 +25,7 @@ MAX_TOKEN_LENGTH = 2_048
 MAX_TOKEN_LIFETIME_S = 7 * 86_400
 """Maximum time from `iat` to `exp`."""
 MAX_SHARE_LIFETIME_S = 31 * 86_400
-"""The same for a token of a link, which can be revoked."""
+"""Maximum time from `iat` to `exp` of a token of a link, which can be revoked."""
 CLOCK_SKEW_S = 60
 """Tolerance for `iat` and `nbf` of an issuer whose clock is ahead. There is none for `exp`."""
 MAX_SUBJECT_CHARACTERS = 64

@@ -25,7 +25,7 @@ from bunraku.runtime.worker_process import WorkerFailed, WorkerTimedOut, run_in_
 MAX_LARGE_BODIES = 8
 """Large bodies of one kind that are received, processed or answered at the same time; further ones get 503."""
 MAX_LARGE_BODIES_PER_HOLDER = 2
-"""The same for one subject, or for one address without a subject."""
+"""Large bodies of one kind and one subject, or one address without a subject."""
 PROCESSING_TIMEOUT_S = 30.0
 """Time limit for the processing of one body in its worker process, in seconds."""
 WRITE_CHUNK_BYTES = 256 << 10

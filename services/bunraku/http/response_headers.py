@@ -13,7 +13,7 @@ DOCUMENT_HEADERS = {
     "Content-Security-Policy": "default-src 'none'; frame-ancestors 'none'",
     "X-Frame-Options": "DENY",
 }
-"""Headers of every other response that sets none of its own: it loads nothing, runs nothing and cannot be framed."""
+"""Headers of every other response without such headers: it loads nothing, runs nothing and cannot be framed."""
 
 
 class ContentSecurityMiddleware:
@@ -38,7 +38,7 @@ class ContentSecurityMiddleware:
 def mark_cache_private(send: Send) -> Send:
     """Return `send` for a response that needed a token: no shared cache may store it (RFC 9111, section 5.2.2).
 
-    Without a Cache-Control of its own, the response must be validated before it is used again. `Vary: Authorization`
+    Without Cache-Control the response must be validated before it is used again. `Vary: Authorization`
     keeps a browser from using it with another token. Responses with `no-store` stay unchanged.
     """
 

@@ -21,7 +21,7 @@ BUILDS_PER_S = 0.5
 """Resources that are not cached and that one client may request per second. A processor needs about 70 ms for a table
 and 400 ms for a figure."""
 BUILD_BURST = 20.0
-"""The same at once: a client needs a table for each performer."""
+"""Builds at once: a client needs a table for each performer."""
 
 
 @dataclass(frozen=True, slots=True)

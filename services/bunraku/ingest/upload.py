@@ -23,7 +23,7 @@ from bunraku.runtime.temporary_folder import temporary_folder
 MAX_UPLOADS = 64
 """Uploads that are received, wait for a worker slot or are processed at the same time; further ones get 503."""
 MAX_UPLOADS_PER_HOLDER = 8
-"""The same for one subject, or for one address without a subject."""
+"""Uploads of one subject, or of one address without a subject, at the same time."""
 
 JobFactory = Callable[[bytes], UploadJob]
 """Function that describes the job for a file, from its SHA-256 digest."""

@@ -103,7 +103,7 @@ def _prepare_server() -> None:
     stack = contextlib.ExitStack()
     folder = stack.enter_context(temporary_folder("workers"))
     atexit.register(stack.close)
-    # by default a folder of its own, which stays after a kill
+    # the default is a separate folder, which stays after a kill
     multiprocessing.current_process()._config.setdefault("tempdir", str(folder))  # type: ignore[attr-defined]
 
 

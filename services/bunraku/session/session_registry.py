@@ -2,7 +2,7 @@
 
 A session exists while its record does, and belongs to the replica that the record names. Creation, every edit,
 take-over, hand-over and end are one compare-and-set of the record each: the write that succeeds decides. The local copy
-of the records may lag behind; it tells what to attempt, never what is so.
+of the records may lag behind; it suggests an attempt, which the store decides.
 """
 
 from __future__ import annotations

@@ -26,7 +26,7 @@ class SpaceReserve:
     def restore(self) -> bool:
         """Create the file, or a larger one if there is space by now. Return whether the file exists.
 
-        After `release` it takes back what it had, or what is left of it.
+        After `release` it takes back the space that is still free, at most its former size.
         """
         present = self._size()
         try:

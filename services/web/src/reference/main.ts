@@ -1,4 +1,4 @@
-/** Reference page of the HTTP API at `/v1/docs`, drawn from the server's OpenAPI description. It needs no other site. */
+/** Reference page of the HTTP API at `/v1/docs`, drawn from the server's OpenAPI description without other sites. */
 import { type Content, groupRoutes, type OpenApi, type Route, type Schema } from "./openapi";
 import { limitText, schemaText } from "./schema-text";
 
