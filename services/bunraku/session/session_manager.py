@@ -56,7 +56,8 @@ class SessionManager:
         self._open_rate = KeyedTokenBuckets(OPENINGS_PER_S, OPENING_BURST)
         self._claim_slots = asyncio.Semaphore(MAX_CONCURRENT_CLAIMS)
         self._claim_tasks: set[asyncio.Task[None]] = set()
-        self._changed_sessions: set[str] = set()
+        # in order of change, so that a simulation is the same each time
+        self._changed_sessions: dict[str, None] = {}
         self._has_changes = asyncio.Event()
         self._registry.replicas.on_heartbeat(self._review_all)
         self.counters = SessionCounters()
@@ -265,17 +266,17 @@ class SessionManager:
 
     def _review(self, session: str) -> None:
         """Settle a session whose record has changed."""
-        self._changed_sessions.add(session)
+        self._changed_sessions[session] = None
         self._has_changes.set()
 
     def _review_all(self) -> None:
         """Settle all sessions: the liveness of their owners may have changed."""
-        self._changed_sessions |= self._registry.sessions.keys() | self._endpoints.keys()
+        self._changed_sessions.update(dict.fromkeys((*self._registry.sessions, *self._endpoints)))
         self._has_changes.set()
 
     async def _settle_changes(self) -> None:
         """Close lost stages, claim abandoned sessions and end idle ones."""
-        changed, self._changed_sessions = self._changed_sessions, set()
+        changed, self._changed_sessions = self._changed_sessions, {}
         for session in changed:
             endpoint = self._endpoints.get(session)
             if endpoint is not None and self._registry.is_lost(session, endpoint.revision):
