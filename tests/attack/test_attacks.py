@@ -116,8 +116,12 @@ def test_tracebacks_in_the_log_are_counted(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("address", "is_found"), [("0.0.0.0", True), ("127.0.0.1", False)])
 def test_services_of_a_stack_are_found_by_their_command(address: str, is_found: bool) -> None:
-    command = [sys.executable, "-c", "input()", "/usr/bin/bunraku", "up", "--host", address, "--service", "ik"]
-    with subprocess.Popen(command, stdin=subprocess.PIPE) as process:
+    code = "print(flush=True); input()"
+    command = [sys.executable, "-c", code, "/usr/bin/bunraku", "up", "--host", address, "--service", "ik"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        # a process that has just been started may not have its command yet
+        assert process.stdout is not None
+        process.stdout.readline()
         assert (process.pid in find_service_processes()) == is_found
         assert ResourceMeter(lambda: [process.pid]).measure().descriptors >= 3
         process.communicate(b"\n")
