@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Coroutine
 from pathlib import Path
 from random import Random
@@ -52,7 +53,7 @@ class Cluster(Protocol):
         """Return a generator that depends on the seed and this name only."""
 
 
-class Replica:
+class Replica(ABC):
     """One replica of a service, which can be killed, stopped and started again."""
 
     def __init__(self, cluster: Cluster, name: str, clock_error: ClockError) -> None:
@@ -112,11 +113,13 @@ class Replica:
         self.left_tasks = sorted(task.get_name() for task in self.node.tasks)
         self.kill()
 
+    @abstractmethod
     def _start_service(self) -> None:
-        raise NotImplementedError
+        """Start the service in the new process."""
 
+    @abstractmethod
     async def _stop_service(self) -> None:
-        raise NotImplementedError
+        """Stop the service as its lifespan does."""
 
 
 async def cancel(task: asyncio.Task[Any]) -> None:
