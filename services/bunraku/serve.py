@@ -42,9 +42,11 @@ from bunraku.page_files import create_page_app, reference_response
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.housekeeping import Housekeeping
+from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
 from bunraku.runtime.settings import Settings
 from bunraku.session import limb_solver
+from bunraku.websocket.connection import TURN_US
 from bunraku.websocket.handoff import HandoffProtocol
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES
 
@@ -180,7 +182,7 @@ def uvicorn_protocol_options() -> dict[str, Any]:
     """Return uvicorn's options for the HTTP and WebSocket protocols."""
     return {
         "http": partial(HttpProtocol, HttpLoad()),
-        "ws": HandoffProtocol,
+        "ws": partial(HandoffProtocol, InputScheduler(TURN_US)),
         "ws_max_size": MAX_CLIENT_MESSAGE_BYTES,
         "ws_per_message_deflate": False,
     }

@@ -204,7 +204,7 @@ async def test_body_in_tiny_chunks_is_parsed_in_turns(monkeypatch: pytest.Monkey
     first, second = connections
     first.data_received(b"POST / HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n" + b"1\r\nx\r\n" * 10_000)
     # this takes far longer than a turn, so that the rest waits and nothing more is read
-    assert load.is_parsing
+    assert load.input.is_busy
     assert transports[0].is_paused
     # data of others waits for its turn, not for the end of the first body
     second.data_received(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
@@ -213,7 +213,7 @@ async def test_body_in_tiny_chunks_is_parsed_in_turns(monkeypatch: pytest.Monkey
         # each iteration of the event loop parses data of one connection
         await asyncio.sleep(0)
     assert second.conn.their_state is not h11.IDLE
-    assert load.is_parsing
+    assert load.input.is_busy
     for connection, connected in zip(connections, transports, strict=True):
         connected.abort()
         connection.connection_lost(None)

@@ -1,12 +1,12 @@
 from __future__ import annotations
 
 import asyncio
-from itertools import pairwise
+from itertools import count, pairwise
 from typing import Any
 
 import pytest
 
-from bunraku.websocket.connection import FRAMES_PER_TURN, FrameLimit, WebSocketConnection
+from bunraku.websocket.connection import FRAMES_PER_TURN, TURN_US, FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import Opcode
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from tests.raw_client import client_frame
@@ -149,7 +149,9 @@ async def test_flood_within_one_segment_gets_one_pong_at_most() -> None:
 
 async def test_other_connections_are_served_between_the_frames_of_one() -> None:
     transport, listener = FakeTransport(), RecordingListener()
-    connection = WebSocketConnection(transport, listener, set(), lambda: 0, FrameLimit(0.0, 1_000.0))
+    # each turn takes the time of an iteration
+    clock = count(0, TURN_US).__next__
+    connection = WebSocketConnection(transport, listener, set(), clock, FrameLimit(0.0, 1_000.0))
     connection.data_received(client_frame(Opcode.BINARY, b"m") * 100 + b"\x82")
     turns = [len(listener.events)]
     while len(listener.events) < 100:

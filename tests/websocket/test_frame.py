@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
@@ -18,6 +19,11 @@ from bunraku.websocket.frame import (
     frame_payload,
     parse_close_code,
 )
+
+
+def parse(parser: ClientFrameParser, data: bytes) -> Iterator[tuple[Opcode, bytes]]:
+    parser.append(data)
+    return parser.parse()
 
 
 @pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536, 70_000])
@@ -56,7 +62,7 @@ def test_parser_reassembles_frames_split_at_any_byte(sent: list[tuple[Opcode, ob
             expected += [(opcode, b"".join(payload)), (Opcode.PING, b"between")]
     cut_points = sorted(cuts.randint(0, len(data)) for _ in range(5))  # type: ignore[attr-defined]
     parser = ClientFrameParser(1200)
-    parsed = [message for a, b in pairwise([0, *cut_points, len(data)]) for message in parser.parse(data[a:b])]
+    parsed = [message for a, b in pairwise([0, *cut_points, len(data)]) for message in parse(parser, data[a:b])]
     # an empty continuation stands for each fragment that completes no message
     assert [message for message in parsed if message != (Opcode.CONTINUATION, b"")] == expected
 
@@ -84,7 +90,7 @@ def masked(head: int, payload: bytes, length_field: int | None = None) -> bytes:
 )
 def test_protocol_violation_raises_frame_error(data: bytes, code: int) -> None:
     with pytest.raises(FrameError) as raised:
-        list(ClientFrameParser(1024).parse(data))
+        list(parse(ClientFrameParser(1024), data))
     assert raised.value.code == code
     assert raised.value.detail
 
@@ -92,7 +98,7 @@ def test_protocol_violation_raises_frame_error(data: bytes, code: int) -> None:
 @given(st.binary(max_size=300))
 def test_arbitrary_bytes_raise_only_frame_errors(data: bytes) -> None:
     with contextlib.suppress(FrameError):
-        for opcode, payload in ClientFrameParser(64).parse(data):
+        for opcode, payload in parse(ClientFrameParser(64), data):
             assert opcode in Opcode
             assert len(payload) <= 125
 

@@ -5,6 +5,8 @@ import contextlib
 import socket
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
@@ -15,8 +17,9 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
+from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.websocket import handoff
-from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.connection import TURN_US, WebSocketConnection
 from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.handoff import HandoffProtocol, detach, reject
 from bunraku.websocket.subprotocol import CloseConnection
@@ -57,8 +60,9 @@ class RecordingListener:
 @asynccontextmanager
 async def serve_app(endpoint: Callable[[WebSocket], Awaitable[None]]) -> AsyncIterator[tuple[str, uvicorn.Server]]:
     app = Starlette(routes=[WebSocketRoute("/", endpoint)])
+    protocol: Any = partial(HandoffProtocol, InputScheduler(TURN_US))
     config = uvicorn.Config(
-        app, ws=HandoffProtocol, lifespan="off", log_config=None, log_level="warning", ws_per_message_deflate=False
+        app, ws=protocol, lifespan="off", log_config=None, log_level="warning", ws_per_message_deflate=False
     )
     server = uvicorn.Server(config)
     with socket.create_server(("127.0.0.1", 0)) as listening:

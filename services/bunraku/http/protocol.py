@@ -6,7 +6,6 @@ import asyncio
 import json
 import logging
 import time
-from collections import deque
 from http import HTTPStatus
 from typing import Any
 
@@ -15,6 +14,8 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from bunraku.http.problem_details import MEDIA_TYPE
 from bunraku.http.request_head import BoundedConnection
+from bunraku.http.token_bucket import client_network
+from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.transport import LingeringClose, WriteDeadline
 
 HEADER_TIMEOUT_S = 10.0
@@ -42,24 +43,8 @@ class HttpLoad:
     def __init__(self) -> None:
         self.waiting_for_head: dict[HttpProtocol, None] = {}
         """Connections without a complete request head, the oldest first."""
-        self._unparsed: deque[HttpProtocol] = deque()
-
-    @property
-    def is_parsing(self) -> bool:
-        """True if received data waits to be parsed."""
-        return bool(self._unparsed)
-
-    def parse_later(self, connection: HttpProtocol) -> None:
-        """Parse data of `connection` in its turn. In each iteration of the event loop one connection is parsed."""
-        self._unparsed.append(connection)
-        if len(self._unparsed) == 1:
-            connection.loop.call_soon(self._parse_next)
-
-    def _parse_next(self) -> None:
-        connection = self._unparsed.popleft()
-        if self._unparsed:
-            connection.loop.call_soon(self._parse_next)
-        connection.continue_parsing()
+        # a request costs far more than its head: one is begun in each iteration of the event loop
+        self.input = InputScheduler(0)
 
 
 class HttpProtocol(H11Protocol):
@@ -81,6 +66,7 @@ class HttpProtocol(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         super().connection_made(transport)
+        self.source = client_network(self.client[0]) if self.client else ""
         # responses continue when the buffer is empty
         transport.set_write_buffer_limits(0, 0)
         self._write_deadline = WriteDeadline(transport)
@@ -89,12 +75,21 @@ class HttpProtocol(H11Protocol):
     def data_received(self, data: bytes) -> None:
         is_waiting = bool(self._unparsed)
         self._unparsed += data
-        if is_waiting:
-            self.transport.pause_reading()
-        elif self._load.is_parsing:
-            self._wait_for_turn()
-        else:
-            self._parse()
+        if not is_waiting:
+            self._load.input.schedule(self)
+
+    def pause_reading(self) -> None:
+        """Read nothing from the client while received data waits for its turn."""
+        self.transport.pause_reading()
+
+    def resume_reading(self) -> None:
+        """Read from the client again, unless the application has not taken the body so far."""
+        if not self.flow.read_paused and self.transport.get_protocol() is self and not self.transport.is_closing():
+            self.transport.resume_reading()
+
+    def abort(self) -> None:
+        """End the connection after a failure."""
+        self.transport.abort()
 
     def on_response_complete(self) -> None:
         super().on_response_complete()
@@ -143,38 +138,27 @@ class HttpProtocol(H11Protocol):
         self._unparsed.clear()
         super().connection_lost(exc)
 
-    def _parse(self) -> None:
-        """Parse received data for about `PARSE_TIME_S`, and the rest after the events of other connections."""
+    def handle_input(self) -> bool:
+        """Parse received data for about `PARSE_TIME_S`. Return whether some of it is left."""
+        if self.transport.is_closing():
+            self._unparsed.clear()
         begun_at = piece_begun_at = time.perf_counter()
         while self._unparsed:
             piece = bytes(self._unparsed[: self._parse_bytes])
             del self._unparsed[: len(piece)]
             super().data_received(piece)
             if self.transport.get_protocol() is not self:
-                return
+                return False
             now = time.perf_counter()
             if now - piece_begun_at > PARSE_TIME_S:
                 self._parse_bytes = MIN_PARSE_BYTES
             elif now - piece_begun_at < PARSE_TIME_S / 4:
                 self._parse_bytes = min(2 * self._parse_bytes, MAX_PARSE_BYTES)
             piece_begun_at = now
-            if self._unparsed and now - begun_at > PARSE_TIME_S:
-                self._wait_for_turn()
+            if now - begun_at > PARSE_TIME_S:
                 break
         self._update_timeout()
-
-    def _wait_for_turn(self) -> None:
-        self.transport.pause_reading()
-        self._load.parse_later(self)
-
-    def continue_parsing(self) -> None:
-        """Parse data that waits."""
-        if self.transport.is_closing():
-            self._unparsed.clear()
-            return
-        self._parse()
-        if not self._unparsed and not self.flow.read_paused and self.transport.get_protocol() is self:
-            self.transport.resume_reading()
+        return bool(self._unparsed)
 
     def _error_response(self, detail: str) -> bytes:
         """Return the response to a request that cannot be parsed, as a problem document."""

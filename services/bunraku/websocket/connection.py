@@ -15,6 +15,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Protocol, cast
 
 from bunraku.runtime.clock import clock
+from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.runtime.transport import LingeringClose, WriteDeadline
 from bunraku.websocket.frame import (
@@ -37,7 +38,9 @@ the overhead of its buffers. Data in this buffer cannot be replaced when newer d
 
 
 FRAMES_PER_TURN = 16
-"""Frames of one connection that are handled before the events of other connections."""
+"""Frames of one connection that are handled before those of other connections."""
+TURN_US = 1_000
+"""Time for frames of clients in each iteration of the event loop, microseconds."""
 
 
 class FrameLimit(NamedTuple):
@@ -86,6 +89,7 @@ class WebSocketConnection(asyncio.Protocol):
         "_close_timer",
         "_connections",
         "_frames",
+        "_input",
         "_listener",
         "_parser",
         "_transport",
@@ -94,6 +98,7 @@ class WebSocketConnection(asyncio.Protocol):
         "is_writable",
         "last_received_at",
         "on_ended",
+        "source",
         "write",
     )
 
@@ -104,13 +109,19 @@ class WebSocketConnection(asyncio.Protocol):
         connections: set[object],
         clock: Callable[[], int] = clock,
         limit: FrameLimit = VIEWER_FRAMES,
+        scheduler: InputScheduler | None = None,
     ) -> None:
-        """Take over `transport`. The server calls `shutdown` on all members of `connections` when it stops."""
+        """Take over `transport`. The server calls `shutdown` on all members of `connections` when it stops.
+
+        Connections that share a `scheduler` are handled in turns.
+        """
         self._transport = transport
         self._listener = listener
         self._connections = connections
         self._clock = clock
+        self._input = scheduler or InputScheduler(TURN_US, clock)
         self._parser = ClientFrameParser(MAX_CLIENT_MESSAGE_BYTES)
+        self.source = (transport.get_extra_info("peername") or ("",))[0]
         self._close_timer: asyncio.TimerHandle | None = None
         self._write_deadline: WriteDeadline | None = None
         self.is_writable = True
@@ -173,13 +184,26 @@ class WebSocketConnection(asyncio.Protocol):
         # closing a socket with unread input at once would discard the bytes just written
         self._close_timer = asyncio.get_running_loop().call_later(CLOSE_TIMEOUT_S, self._transport.abort)
 
+    def pause_reading(self) -> None:
+        """Read nothing from the client while received frames wait for their turn."""
+        self._transport.pause_reading()
+
+    def resume_reading(self) -> None:
+        """Read from the client again."""
+        if self._transport.get_protocol() is self and not self._transport.is_closing():
+            self._transport.resume_reading()
+
     def data_received(self, data: bytes) -> None:
         self.last_received_at = self._clock()
-        self._receive(data)
+        self._parser.append(data)
+        self._input.schedule(self)
 
-    def _receive(self, data: bytes) -> None:
-        """Handle some frames of the unparsed data and `data`, and the rest after the events of other connections."""
-        frames, handled, ping = self._parser.parse(data), 0, None
+    def handle_input(self) -> bool:
+        """Handle up to `FRAMES_PER_TURN` received frames. Return whether more may be left."""
+        if self._transport.is_closing():
+            return False
+        handled, ping = 0, None
+        frames = self._parser.parse()
         try:
             for opcode, payload in frames:
                 self._count_frame()
@@ -189,8 +213,6 @@ class WebSocketConnection(asyncio.Protocol):
                 else:
                     self._handle_frame(opcode, payload)
                 if handled == FRAMES_PER_TURN:
-                    self._transport.pause_reading()
-                    asyncio.get_running_loop().call_soon(self._continue_receiving)
                     break
             if not handled:
                 self._count_frame()
@@ -206,12 +228,7 @@ class WebSocketConnection(asyncio.Protocol):
         if ping is not None and self.is_writable and self._close_timer is None:
             # one Pong for the most recent Ping (RFC 6455, section 5.5.3)
             self.write(encode_frame(ping, Opcode.PONG))
-
-    def _continue_receiving(self) -> None:
-        if self._transport.get_protocol() is self and not self._transport.is_closing():
-            self._transport.resume_reading()
-            if self._parser.has_unparsed_data:
-                self._receive(b"")
+        return handled == FRAMES_PER_TURN and self._parser.has_unparsed_data
 
     def _count_frame(self) -> None:
         if not self._frames.take(self.last_received_at * 1e-6):

@@ -97,16 +97,18 @@ class ClientFrameParser:
         """True if data waits: the beginning of a frame, or frames after a caller stopped."""
         return bool(self._buffer)
 
-    def parse(self, data: bytes) -> Generator[tuple[Opcode, bytes], None, None]:
-        """Yield the opcode and payload of each message and control frame that `data` completes.
+    def append(self, data: bytes) -> None:
+        """Add received data."""
+        self._buffer += data
+
+    def parse(self) -> Generator[tuple[Opcode, bytes], None, None]:
+        """Yield the opcode and payload of each message and control frame that the received data completes.
 
         A fragment that completes no message is an empty CONTINUATION, so that a caller can count frames. A caller that
         stops before the end closes the generator; the next call continues there. Raises `FrameError`; the parser must
         not be used after that.
         """
-        if self._buffer:
-            data = self._buffer + data
-        at = 0
+        data, at = self._buffer, 0
         try:
             for end, opcode, payload, final in self._parse_frames(data):
                 at = end

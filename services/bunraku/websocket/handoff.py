@@ -16,6 +16,7 @@ from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIO
 from websockets.http11 import Request
 
 from bunraku.runtime.clock import clock
+from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.websocket import link, subprotocol
 from bunraku.websocket.connection import VIEWER_FRAMES, ConnectionListener, FrameLimit, WebSocketConnection
 from bunraku.websocket.subprotocol import CloseConnection
@@ -49,8 +50,10 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
     `tests/test_library_interfaces.py` checks them.
     """
 
-    def __init__(self, *args: Any, **options: Any) -> None:
+    def __init__(self, scheduler: InputScheduler, *args: Any, **options: Any) -> None:
+        """`scheduler` gives turns to the frames of all accepted connections."""
         super().__init__(*args, **options)
+        self._scheduler = scheduler
         self._handshake_timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -92,7 +95,9 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         self.stop_keepalive()
         self.connections.discard(self)
         self.transport = _DETACHED_TRANSPORT
-        connection = WebSocketConnection(transport, listener, cast(set[object], self.connections), clock, limit)
+        connection = WebSocketConnection(
+            transport, listener, cast(set[object], self.connections), clock, limit, self._scheduler
+        )
         transport.resume_reading()
         return connection
 
