@@ -43,6 +43,7 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.housekeeping import Housekeeping
 from bunraku.runtime.input_scheduler import InputScheduler
+from bunraku.runtime.open_connections import OpenConnections
 from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
 from bunraku.runtime.settings import Settings
 from bunraku.session import limb_solver
@@ -66,6 +67,10 @@ REQUIRED_BACKENDS: dict[str, tuple[Dependency, ...]] = {
 WARM_UP_DELAY_S = 1.5
 """Time after the start in which the process only serves, so that the first page loads quickly."""
 SHUTDOWN_TIMEOUT_S = 2
+MAX_FILES = 50_000
+"""Most files that a process opens, connections included, even if the system permits more."""
+RESERVED_FILES = 256
+"""Files that are not used for clients' connections: backends, motions, uploads and worker processes."""
 
 ServiceFactory = Callable[[], FastAPI]
 
@@ -189,10 +194,11 @@ def uvicorn_protocol_options() -> dict[str, Any]:
 
 
 class _Server(uvicorn.Server):
-    """uvicorn server that reports its start and ends without raising the signal again."""
+    """uvicorn server that reports its start, bounds its connections, and ends without raising the signal again."""
 
-    def __init__(self, config: uvicorn.Config, on_ready: Callable[[], None]) -> None:
+    def __init__(self, config: uvicorn.Config, max_connections: int, on_ready: Callable[[], None]) -> None:
         super().__init__(config)
+        self.server_state.connections = OpenConnections(max_connections)
         self._on_ready = on_ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
@@ -222,7 +228,8 @@ async def serve(
     services: Collection[str] = SERVICES,
 ) -> None:
     """Serve on a listening socket until SIGINT or SIGTERM. Call `on_ready` once requests are accepted."""
-    _raise_open_file_limit()
+    max_files = _raise_open_file_limit()
+    max_connections = max(max_files - RESERVED_FILES, max_files // 2)
     with listening_socket:
         async with compose_app(settings, demo=demo, services=services) as app:
             config = uvicorn.Config(
@@ -238,19 +245,24 @@ async def serve(
                 server_header=False,
                 timeout_graceful_shutdown=SHUTDOWN_TIMEOUT_S,
             )
-            await _Server(config, on_ready).serve(sockets=[listening_socket])
+            await _Server(config, max_connections, on_ready).serve(sockets=[listening_socket])
 
 
-def _raise_open_file_limit() -> None:
-    """Raise the limit on open files: each viewer needs one, and the default is often 1,024."""
+def _raise_open_file_limit() -> int:
+    """Raise the limit on open files, as each viewer needs one and the default is often 1,024, and return it.
+
+    Of an unlimited number, `MAX_FILES` are used.
+    """
     if sys.platform == "win32":
-        return
+        return MAX_FILES
     import resource
 
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     # some systems report no limit and reject it
     with suppress(ValueError):
         resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return MAX_FILES if soft == resource.RLIM_INFINITY else min(soft, MAX_FILES)
 
 
 async def _complete_before_ready(work: Awaitable[None], name: str, readiness: Readiness) -> None:

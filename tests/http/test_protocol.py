@@ -11,6 +11,7 @@ import pytest
 import uvicorn
 from uvicorn.server import ServerState
 
+from bunraku import serve
 from bunraku.http import protocol, request_body
 from bunraku.http.protocol import HttpLoad, HttpProtocol
 from bunraku.runtime import transport
@@ -231,3 +232,21 @@ async def test_oldest_waiting_connection_makes_room_for_a_new_one(url: str, monk
     assert await read_until_closed(waiting[0][0]) == b""
     for _, writer in waiting:
         writer.close()
+
+
+async def test_address_that_fills_the_server_keeps_nobody_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(serve, "MAX_FILES", 40)
+    request = b"GET /v1/health HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+    with run_server(tmp_path) as url:
+        port = urlsplit(url).port
+        held = [await asyncio.open_connection("127.0.0.1", port, local_addr=("127.0.0.2", 0)) for _ in range(60)]
+        # the server closes what is beyond its capacity of 20
+        ended = [asyncio.create_task(read_until_closed(reader)) for reader, _ in held]
+        async with asyncio.timeout(TIMEOUT_S):
+            while sum(task.done() for task in ended) < 40:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        for _ in range(3):
+            assert b'"ok"' in await exchange(url, request + b"Connection: close\r\n\r\n")
+        for _, writer in held:
+            writer.close()
+        await asyncio.gather(*ended)

@@ -1,8 +1,6 @@
 from __future__ import annotations
 
-import pytest
-
-from bunraku.http.token_bucket import KeyedTokenBuckets, client_network
+from bunraku.http.token_bucket import KeyedTokenBuckets
 
 
 def test_keys_have_separate_buckets_and_their_number_is_limited() -> None:
@@ -17,17 +15,3 @@ def test_keys_have_separate_buckets_and_their_number_is_limited() -> None:
     # full buckets are evicted as well
     assert buckets.take("g", 100.0)
     assert len(buckets._buckets) == 1
-
-
-@pytest.mark.parametrize(
-    ("address", "network"),
-    [
-        ("192.0.2.7", "192.0.2.7"),
-        ("::ffff:192.0.2.7", "192.0.2.7"),
-        ("2001:db8:1:2:3:4:5:6", "2001:db8:1:2::"),
-        ("2001:db8:1:2:ffff::1", "2001:db8:1:2::"),
-        ("a pipe", "a pipe"),
-    ],
-)
-def test_client_network_groups_ipv6_addresses(address: str, network: str) -> None:
-    assert client_network(address) == network

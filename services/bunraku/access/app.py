@@ -13,8 +13,8 @@ from bunraku.http.access_token import MAX_SHARE_LIFETIME_S
 from bunraku.http.problem_details import install_problem_handlers, motion_not_found, session_not_found
 from bunraku.http.ticket_store import TICKET_LIFETIME_S, TooManyTickets
 from bunraku.http.timestamp import format_timestamp
-from bunraku.http.token_bucket import client_network
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.client_network import client_network
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import Share

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from starlette.requests import HTTPConnection
 
 from bunraku.http.access_control import access_of
-from bunraku.http.token_bucket import client_network
+from bunraku.runtime.client_network import client_network
 from bunraku.runtime.problem import ProblemError
 
 

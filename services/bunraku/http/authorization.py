@@ -27,8 +27,9 @@ from bunraku.http.origin import is_allowed_origin, is_local_host, parse_origins
 from bunraku.http.problem_details import motion_not_found, problem_response, session_not_found, unavailable_response
 from bunraku.http.request_body import limit_body, too_large_detail
 from bunraku.http.response_headers import mark_cache_private
-from bunraku.http.token_bucket import KeyedTokenBuckets, client_network
+from bunraku.http.token_bucket import KeyedTokenBuckets
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.client_network import client_network
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.websocket import subprotocol

@@ -14,7 +14,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from bunraku.http.problem_details import MEDIA_TYPE
 from bunraku.http.request_head import BoundedConnection
-from bunraku.http.token_bucket import client_network
+from bunraku.runtime.client_network import peer_network
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.transport import LingeringClose, WriteDeadline
 
@@ -65,8 +65,9 @@ class HttpProtocol(H11Protocol):
         self._parse_bytes = MIN_PARSE_BYTES
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        # the base class adds the connection to those of the server, which may abort it
+        self.transport, self.source = transport, peer_network(transport)
         super().connection_made(transport)
-        self.source = client_network(self.client[0]) if self.client else ""
         # responses continue when the buffer is empty
         transport.set_write_buffer_limits(0, 0)
         self._write_deadline = WriteDeadline(transport)

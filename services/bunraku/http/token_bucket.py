@@ -1,8 +1,7 @@
-"""Token buckets by key, and the key of a client's address. The time is an argument, in seconds."""
+"""Token buckets by key. The time is an argument, in seconds."""
 
 from __future__ import annotations
 
-import ipaddress
 from collections import OrderedDict
 
 from bunraku.runtime.token_bucket import TokenBucket
@@ -30,16 +29,3 @@ class KeyedTokenBuckets:
             len(self._buckets) >= self._max_keys or next(iter(self._buckets.values())).is_full(now)
         ):
             self._buckets.popitem(last=False)
-
-
-def client_network(address: str) -> str:
-    """Return the rate-limiting key of an address: an IPv4 address itself, the /64 network of an IPv6 address."""
-    try:
-        parsed = ipaddress.ip_address(address)
-    except ValueError:
-        return address
-    if parsed.version == 6:
-        if parsed.ipv4_mapped is not None:
-            return str(parsed.ipv4_mapped)
-        return str(ipaddress.ip_network((parsed, 64), strict=False).network_address)
-    return str(parsed)

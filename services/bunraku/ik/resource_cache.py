@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from starlette.requests import Request
 
 from bunraku.http.access_control import Role, access_of
-from bunraku.http.token_bucket import KeyedTokenBuckets, client_network
+from bunraku.http.token_bucket import KeyedTokenBuckets
+from bunraku.runtime.client_network import client_network
 from bunraku.runtime.problem import ProblemError
 
 MAX_CACHED_RESOURCES = 256

@@ -14,6 +14,7 @@ import socket
 from collections.abc import Callable
 from typing import NamedTuple, Protocol, cast
 
+from bunraku.runtime.client_network import peer_network
 from bunraku.runtime.clock import clock
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.token_bucket import TokenBucket
@@ -109,11 +110,14 @@ class WebSocketConnection(asyncio.Protocol):
         connections: set[object],
         clock: Callable[[], int] = clock,
         limit: FrameLimit = VIEWER_FRAMES,
+        *,
         scheduler: InputScheduler | None = None,
+        source: str | None = None,
     ) -> None:
         """Take over `transport`. The server calls `shutdown` on all members of `connections` when it stops.
 
-        Connections that share a `scheduler` are handled in turns.
+        Connections that share a `scheduler` are handled in turns. `source` is the network of the client if a proxy is
+        the peer.
         """
         self._transport = transport
         self._listener = listener
@@ -121,7 +125,7 @@ class WebSocketConnection(asyncio.Protocol):
         self._clock = clock
         self._input = scheduler or InputScheduler(TURN_US, clock)
         self._parser = ClientFrameParser(MAX_CLIENT_MESSAGE_BYTES)
-        self.source = (transport.get_extra_info("peername") or ("",))[0]
+        self.source = peer_network(transport) if source is None else source
         self._close_timer: asyncio.TimerHandle | None = None
         self._write_deadline: WriteDeadline | None = None
         self.is_writable = True

@@ -15,6 +15,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from bunraku.runtime.client_network import client_network, peer_network
 from bunraku.runtime.clock import clock
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.websocket import link, subprotocol
@@ -57,6 +58,8 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         self._handshake_timer: asyncio.TimerHandle | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        # the base class adds the connection to those of the server, which may abort it
+        self.transport, self.source = cast(asyncio.Transport, transport), peer_network(transport)
         super().connection_made(transport)
         self.transport.pause_reading()
         self._handshake_timer = self.loop.call_later(HANDSHAKE_TIMEOUT_S, self.transport.abort)
@@ -67,6 +70,10 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
             # the only data is the request, which the parser has rejected without an answer
             self.transport.write(_BAD_REQUEST)
             self.transport.close()
+
+    def abort(self) -> None:
+        """End the connection at once."""
+        self.transport.abort()
 
     def handle_parser_exception(self) -> None:
         pass
@@ -95,8 +102,10 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         self.stop_keepalive()
         self.connections.discard(self)
         self.transport = _DETACHED_TRANSPORT
+        connections, client = cast(set[object], self.connections), self.scope["client"]
+        source = client_network(client[0]) if client else None
         connection = WebSocketConnection(
-            transport, listener, cast(set[object], self.connections), clock, limit, self._scheduler
+            transport, listener, connections, clock, limit, scheduler=self._scheduler, source=source
         )
         transport.resume_reading()
         return connection
