@@ -131,6 +131,7 @@ def load_attacks() -> dict[str, Attack]:
         attack_http,
         attack_page,
         attack_reader,
+        attack_request_flood,
         attack_socket,
         attack_upload,
     )

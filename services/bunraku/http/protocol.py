@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 import time
+from enum import Enum, auto
 from http import HTTPStatus
 from typing import Any
 
@@ -47,6 +48,14 @@ class HttpLoad:
         self.input = InputScheduler(0)
 
 
+class _Turn(Enum):
+    """Turn of a connection at the `InputScheduler`."""
+
+    NONE = auto()
+    AWAITED = auto()
+    TAKEN = auto()
+
+
 class HttpProtocol(H11Protocol):
     """HTTP protocol of a server with untrusted clients.
 
@@ -63,6 +72,7 @@ class HttpProtocol(H11Protocol):
         self._header_timer: asyncio.TimerHandle | None = None
         self._unparsed = bytearray()
         self._parse_bytes = MIN_PARSE_BYTES
+        self._turn = _Turn.NONE
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         # the base class adds the connection to those of the server, which may abort it
@@ -74,10 +84,23 @@ class HttpProtocol(H11Protocol):
         self._start_timeout()
 
     def data_received(self, data: bytes) -> None:
-        is_waiting = bool(self._unparsed)
         self._unparsed += data
-        if not is_waiting:
-            self._load.input.schedule(self)
+        if self._turn is _Turn.AWAITED:
+            # reading was resumed at the end of a response
+            self.transport.pause_reading()
+        else:
+            self._await_turn()
+
+    def handle_events(self) -> None:
+        """Begin the next request of the parsed data, or wait for a turn to do so after a response."""
+        if self._turn is _Turn.TAKEN:
+            super().handle_events()
+        elif self._turn is _Turn.NONE:
+            self._await_turn()
+
+    def _await_turn(self) -> None:
+        self._turn = _Turn.AWAITED
+        self._load.input.schedule(self)
 
     def pause_reading(self) -> None:
         """Read nothing from the client while received data waits for its turn."""
@@ -143,13 +166,22 @@ class HttpProtocol(H11Protocol):
         """Parse received data for about `PARSE_TIME_S`. Return whether some of it is left."""
         if self.transport.is_closing():
             self._unparsed.clear()
+            return False
+        self._turn = _Turn.TAKEN
+        try:
+            self._parse()
+        finally:
+            self._turn = _Turn.AWAITED if self._unparsed else _Turn.NONE
+        return bool(self._unparsed)
+
+    def _parse(self) -> None:
         begun_at = piece_begun_at = time.perf_counter()
-        while self._unparsed:
+        # a request may have been parsed before the response to the last one
+        super().handle_events()
+        while self._unparsed and self.transport.get_protocol() is self:
             piece = bytes(self._unparsed[: self._parse_bytes])
             del self._unparsed[: len(piece)]
             super().data_received(piece)
-            if self.transport.get_protocol() is not self:
-                return False
             now = time.perf_counter()
             if now - piece_begun_at > PARSE_TIME_S:
                 self._parse_bytes = MIN_PARSE_BYTES
@@ -158,8 +190,8 @@ class HttpProtocol(H11Protocol):
             piece_begun_at = now
             if now - begun_at > PARSE_TIME_S:
                 break
-        self._update_timeout()
-        return bool(self._unparsed)
+        if self.transport.get_protocol() is self:
+            self._update_timeout()
 
     def _error_response(self, detail: str) -> bytes:
         """Return the response to a request that cannot be parsed, as a problem document."""
