@@ -63,9 +63,6 @@ class RemoteKeyValueStore:
     async def get(self, key: str) -> KeyValueEntry | None:
         return await self._call(f"get {key}", lambda: self.server.get(key))
 
-    async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        return await self._call(f"list {prefix}", lambda: self.server.list_prefix(prefix))
-
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
         return await self._call(f"put {key}", lambda: self.server.put(key, value, revision))
 

@@ -293,7 +293,7 @@ class BrokerClient:
 
 
 class BrokerKeyValueStore:
-    """The broker's key-value store as a process uses it; a list is read key by key, as from a bucket of JetStream."""
+    """The broker's key-value store as a process uses it."""
 
     def __init__(self, client: BrokerClient, broker: Broker) -> None:
         self._client = client
@@ -304,11 +304,6 @@ class BrokerKeyValueStore:
     async def get(self, key: str) -> KeyValueEntry | None:
         entry: KeyValueEntry | None = await self._call(lambda: self._store.get(key))
         return entry
-
-    async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        listed: dict[str, KeyValueEntry] = await self._call(lambda: self._store.list_prefix(prefix))
-        entries = await asyncio.gather(*(self.get(key) for key in listed))
-        return {key: entry for key, entry in zip(listed, entries, strict=True) if entry is not None}
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
         written: int = await self._call(lambda: self._store.put(key, value, revision))

@@ -18,7 +18,6 @@ from bunraku.stream.quiet_period import MAX_QUIET_PERIOD_US
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS
 from bunraku.wire.messages import Data, unpack
 from bunraku.wire.overlay import Overlay
-from tests.simulation.broker import run_at_once
 from tests.simulation.fault import Faults
 from tests.simulation.model import Model, SessionState
 from tests.simulation.replica import SessionReplica
@@ -154,7 +153,7 @@ class Invariants:
                     )
 
     def _check_ended(self) -> None:
-        registered = run_at_once(self._world.broker.store.list_prefix(SESSION_KEY_PREFIX))
+        registered = self._world.broker.store.watch().entries
         for session, state in self._model.sessions.items():
             if state is SessionState.ENDED and f"{SESSION_KEY_PREFIX}.{session}" in registered:
                 raise Violation(f"session {session} was deleted with 204, but its record exists")

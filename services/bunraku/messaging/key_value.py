@@ -137,9 +137,6 @@ class KeyValueStore(Protocol):
     async def get(self, key: str) -> KeyValueEntry | None:
         """Return the entry of a key, None if it does not exist."""
 
-    async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        """Return all entries whose keys begin with `prefix` and a dot, in no order."""
-
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
         """Write a value and return its revision.
 
@@ -172,9 +169,6 @@ class MemoryKeyValueStore:
 
     async def get(self, key: str) -> KeyValueEntry | None:
         return self._view.entries.get(key)
-
-    async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        return {key: value for key, value in self._view.entries.items() if key.startswith(f"{prefix}.")}
 
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
         self._check_revision(key, revision)

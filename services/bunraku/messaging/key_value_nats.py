@@ -77,17 +77,6 @@ class NatsKeyValueStore:
         last = await self._get_last_message(_subject(key))
         return None if last is None or last.is_removed else last.entry
 
-    async def list_prefix(self, prefix: str) -> dict[str, KeyValueEntry]:
-        query = {"subjects_filter": _subject(f"{prefix}.>")}
-        info = await self._request_or_unavailable(f"{_API_PREFIX}.INFO.{_STREAM_NAME}", json.dumps(query).encode())
-        subjects = list(info["state"].get("subjects") or ())
-        messages = await asyncio.gather(*map(self._get_last_message, subjects))
-        return {
-            subject.removeprefix(_subject("")): last.entry
-            for subject, last in zip(subjects, messages, strict=True)
-            if last is not None and not last.is_removed
-        }
-
     async def put(self, key: str, value: bytes, revision: int | None = None) -> int:
         expected = revision
         for _ in range(MAX_CREATE_ATTEMPTS):
