@@ -12,14 +12,12 @@ from starlette.exceptions import HTTPException
 
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.display_text import clean_document
+from bunraku.runtime.display_text import MAX_PROBLEM_CHARACTERS, clean_document
 from bunraku.runtime.problem import ProblemError
 
 MEDIA_TYPE = "application/problem+json"
 RETRY_AFTER_S = 2
 """Value of `Retry-After` in responses about an unavailable backend, in seconds."""
-MAX_TEXT_CHARACTERS = 1_000
-"""Maximum length of a text in a problem document."""
 
 _PROBLEM_HEADERS: dict[int, dict[str, str]] = {
     # the rest of a body that is too large is not read
@@ -56,7 +54,7 @@ def problem_response(problem: ProblemError, headers: dict[str, str] | None = Non
 
     Its texts may quote the request or an uploaded file: they are cleaned as names are. It is never cached.
     """
-    body = {"type": "about:blank", **clean_document(problem.to_dict(), MAX_TEXT_CHARACTERS)}
+    body = {"type": "about:blank", **clean_document(problem.to_dict(), MAX_PROBLEM_CHARACTERS)}
     if request := request_id.current():
         body["request_id"] = request
     retry = {"Retry-After": "1"} if problem.status == HTTPStatus.TOO_MANY_REQUESTS else {}

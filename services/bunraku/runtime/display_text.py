@@ -21,6 +21,8 @@ from typing import Any
 
 MAX_NAME_CHARACTERS = 200
 """Maximum length of the name of a motion or of a file; in UTF-8, a name has at most four times as many bytes."""
+MAX_PROBLEM_CHARACTERS = 1_000
+"""Maximum length of a text in a problem document or in a reason to close a connection."""
 MAX_COMBINING_MARKS = 4
 """Combining marks after one base character; scripts in use need at most as many after normalisation."""
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from starlette.websockets import WebSocket
 
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.runtime.display_text import MAX_PROBLEM_CHARACTERS, clean_text
 from bunraku.wire.messages import SUBPROTOCOL
 
 UNAUTHORIZED = 4401
@@ -18,11 +19,15 @@ TRY_AGAIN_LATER = 1013
 
 
 class CloseConnection(Exception):
-    """Reason to close a connection. The client receives `title` and `detail` in a Problem message before the Close."""
+    """Reason to close a connection. The client receives `title` and `detail` in a Problem message before the Close.
+
+    Both may quote the request: they are cleaned as names are.
+    """
 
     def __init__(self, code: int, title: str, detail: str) -> None:
-        super().__init__(f"{title}: {detail}")
-        self.code, self.title, self.detail = code, title, detail
+        self.code = code
+        self.title, self.detail = (clean_text(text, MAX_PROBLEM_CHARACTERS) for text in (title, detail))
+        super().__init__(f"{self.title}: {self.detail}")
 
     @classmethod
     def unavailable(cls, error: BackendUnavailable) -> CloseConnection:
