@@ -149,12 +149,15 @@ class StreamReplica(Replica):
 
     def _start_service(self) -> None:
         self.stream = StreamContext.create(self.context.clock)
-        self.watched = WatchedSessions(self.context.bus, self.context.motion_store, self.stream)
+        self.watched = WatchedSessions(
+            self.context.bus, self.context.key_values, self.context.motion_store, self.stream
+        )
         self.connections: set[object] = set()
 
     async def _stop_service(self) -> None:
         for connection in tuple(self.connections):
             cast(Any, connection).shutdown()
+        await self.watched.close()
 
 
 class IngestReplica(Replica):

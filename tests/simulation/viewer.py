@@ -44,7 +44,7 @@ async def watch_session(
         viewer.open(connection, transport if is_measured else None)
         connection.on_ended = replica.stream.counters.add_viewer(viewer, "session", lambda: None)
     finally:
-        replica.watched.close_if_empty(session)
+        replica.watched.close_if_empty(watched)
     return True
 
 

@@ -176,6 +176,19 @@ async def test_seek_in_paused_session_sends_block_immediately(server: str, tmp_p
     assert found.index >= 5
 
 
+async def test_deleted_session_closes_its_streams_with_problem(server: str, motion: str) -> None:
+    async with Client(server) as client, httpx2.AsyncClient(base_url=server) as http:
+        session = (await client.open_session(motion))["id"]
+        async with socket(server, f"/v1/sessions/{session}/stream") as connection:
+            await receive_until(connection, Choice)
+            assert (await http.delete(f"/v1/sessions/{session}")).status_code == 204
+            problem = await receive_until(connection, Problem)
+            assert isinstance(problem, Problem)
+            assert problem.title == "Session ended"
+            await connection.wait_closed()
+            assert connection.close_code == 4404
+
+
 async def test_paused_stage_gets_visible_blocks_at_best_level(server: str, motion: str) -> None:
     async with Client(server) as client:
         pair = (await client.add_performers(motion, [motion]))["id"]

@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from bunraku.messaging.bus import MemoryBus
+from bunraku.messaging.key_value import MemoryKeyValueStore
 from bunraku.runtime.clock import clock
 from bunraku.runtime.metrics import Metrics
 from bunraku.storage.motion_store import MotionStore
@@ -101,7 +102,9 @@ async def test_disconnected_viewer_is_counted_once(times: int) -> None:
 def test_metrics_cannot_be_registered_twice() -> None:
     registry, watched = (
         Metrics(),
-        WatchedSessions(MemoryBus(), MotionStore.open("memory:///"), StreamContext.create(clock)),
+        WatchedSessions(
+            MemoryBus(), MemoryKeyValueStore(), MotionStore.open("memory:///"), StreamContext.create(clock)
+        ),
     )
     metrics.register_metrics(registry, StreamCounters(), watched)
     with pytest.raises(ValueError, match="bunraku_viewers"):

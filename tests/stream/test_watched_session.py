@@ -9,6 +9,7 @@ import pytest
 from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.messaging.bus import MemoryBus, NoResponse
+from bunraku.messaging.key_value import KeyValueView, MemoryKeyValueStore
 from bunraku.playout import timeline
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.clock import clock
@@ -17,11 +18,11 @@ from bunraku.stream import watched_session
 from bunraku.stream.context import StreamContext
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
-from bunraku.websocket.frame import encode_frame
+from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.subprotocol import NOT_FOUND, CloseConnection
-from bunraku.wire.messages import Presence, TimelineState
+from bunraku.wire.messages import Presence, Problem, TimelineState
 from bunraku.wire.overlay import Overlay
-from tests.stream.fake_transport import FakeTransport
+from tests.stream.fake_transport import FakeTransport, parse_frames
 from tests.vectors.blocks import random_motion
 
 STATE = timeline.start("m", 2_000_000, 1_000)
@@ -35,6 +36,13 @@ async def motion_store() -> MotionStore:
     for name in ("m", "n"):
         await store.put(name, pack_motion(name, encoded))
     return store
+
+
+def close_codes(transport: FakeTransport) -> list[int]:
+    """Return the codes of the Close frames that were sent."""
+    return [
+        int.from_bytes(payload[:2], "big") for opcode, payload in parse_frames(transport.sent) if opcode == Opcode.CLOSE
+    ]
 
 
 def serve_session_state(bus: MemoryBus, state: TimelineState = STATE) -> list[int]:
@@ -60,7 +68,7 @@ async def join_viewer(watched: WatchedSessions) -> tuple[ViewerConnection, FakeT
 async def test_one_subscription_serves_all_viewers_until_last_leaves(motion_store: MotionStore) -> None:
     bus = MemoryBus()
     serve_session_state(bus)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     joined = [await join_viewer(watched) for _ in range(3)]
     assert len(bus._handlers["session.s.overlay"]) == 1
     overlay = Overlay(2, 6, {1: (0,) * 9}).pack()
@@ -80,7 +88,7 @@ async def test_one_subscription_serves_all_viewers_until_last_leaves(motion_stor
 async def test_slow_viewer_gets_newest_overlay_without_delaying_others(motion_store: MotionStore) -> None:
     bus = MemoryBus()
     serve_session_state(bus)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     (_, slow), (_, quick) = [await join_viewer(watched) for _ in range(2)]
     slow.has_capacity = False
     for number in range(10, 20):
@@ -101,7 +109,7 @@ async def test_viewer_counts_are_throttled(motion_store: MotionStore, monkeypatc
     monkeypatch.setattr(watched_session, "VIEWER_COUNT_INTERVAL_S", 0.02)
     bus = MemoryBus()
     counts = serve_session_state(bus)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     joined = [await join_viewer(watched) for _ in range(40)]
     assert len(counts) < 20
     async with asyncio.timeout(10):
@@ -118,7 +126,7 @@ async def test_unchanged_viewer_count_is_published_again(
     monkeypatch.setattr(watched_session, "VIEWER_COUNT_REFRESH_S", 0.02)
     bus = MemoryBus()
     counts = serve_session_state(bus)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     viewer, _ = await join_viewer(watched)
     session = watched._sessions["s"]
     async with asyncio.timeout(10):
@@ -143,7 +151,7 @@ async def test_state_is_requested_again_after_bus_reconnects(
         return packed
 
     bus.serve("session.s.state", answer)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     viewer, transport = await join_viewer(watched)
     await asyncio.gather(*watched._resync_tasks)
     assert [m.limbs.keys() for m in transport.messages if isinstance(m, Overlay)] == [{2}]
@@ -175,7 +183,7 @@ async def test_state_is_requested_until_the_owner_answers(
         return packed
 
     bus.serve("session.s.state", answer)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     viewer, transport = await join_viewer(watched)
     await asyncio.gather(*watched._resync_tasks)
     edited = timeline.edit(STATE, 2_000, playing=False)
@@ -193,7 +201,7 @@ async def test_state_is_requested_until_the_owner_answers(
 async def test_viewer_count_is_published_after_session_takeover(motion_store: MotionStore) -> None:
     bus = MemoryBus()
     counts = serve_session_state(bus)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     joined = [await join_viewer(watched) for _ in range(3)]
     counts.clear()
     bus.publish("session.s.appear", b"")
@@ -214,14 +222,14 @@ async def test_invalid_session_id_is_not_requested(
 
     monkeypatch.setattr(bus, "request", request)
     with pytest.raises(NoResponse):
-        await WatchedSessions(bus, motion_store, StreamContext.create(clock)).open(session)
+        await WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock)).open(session)
     assert requested == []
 
 
 async def test_motion_change_reaches_all_viewers(motion_store: MotionStore) -> None:
     bus = MemoryBus()
     serve_session_state(bus)
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     joined = [await join_viewer(watched) for _ in range(2)]
     other = timeline.change_motion(STATE, 5_000, "n", 2_000_000)
     bus.publish("session.s.timeline", other.pack())
@@ -236,15 +244,88 @@ async def test_motion_change_reaches_all_viewers(motion_store: MotionStore) -> N
 
 async def test_unknown_session_raises_no_response(motion_store: MotionStore) -> None:
     with pytest.raises(NoResponse):
-        await WatchedSessions(MemoryBus(), motion_store, StreamContext.create(clock)).open("s")
+        await WatchedSessions(MemoryBus(), MemoryKeyValueStore(), motion_store, StreamContext.create(clock)).open("s")
 
 
 async def test_session_without_motion_is_rejected_and_closed(motion_store: MotionStore) -> None:
     bus = MemoryBus()
     counts = serve_session_state(bus, timeline.start("none", 2_000_000, 1_000))
-    watched = WatchedSessions(bus, motion_store, StreamContext.create(clock))
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     with pytest.raises(CloseConnection) as closed:
         await watched.open("s")
     assert closed.value.code == NOT_FOUND
     assert not watched._sessions
     assert counts == []
+
+
+async def test_viewers_of_a_deleted_session_are_disconnected_with_reason(motion_store: MotionStore) -> None:
+    bus, key_values = MemoryBus(), MemoryKeyValueStore()
+    counts = serve_session_state(bus)
+    await key_values.put("sessions.s", b"1")
+    await key_values.put("sessions.other", b"1")
+    watched = WatchedSessions(bus, key_values, motion_store, StreamContext.create(clock))
+    joined = [await join_viewer(watched) for _ in range(2)]
+    await key_values.remove("sessions.other")
+    await key_values.put("sessions.s", b"2")
+    assert [close_codes(transport) for _, transport in joined] == [[], []]
+    await key_values.remove("sessions.s")
+    for viewer, transport in joined:
+        assert close_codes(transport) == [NOT_FOUND]
+        assert [m.title for m in transport.messages if isinstance(m, Problem)] == ["Session ended"]
+        viewer.on_close()
+    assert "session.s.overlay" not in bus._handlers
+    assert len(watched) == 0
+    assert counts[-1] == 0
+    # a new session with the same id is another one
+    await key_values.put("sessions.s", b"3")
+    viewer, transport = await join_viewer(watched)
+    assert close_codes(transport) == []
+    await watched.close()
+
+
+async def test_session_that_ended_during_an_outage_is_noticed(
+    motion_store: MotionStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus, key_values = MemoryBus(), MemoryKeyValueStore()
+    callbacks: list[Callable[[], None]] = []
+    monkeypatch.setattr(bus, "on_reconnect", callbacks.append)
+    # the watch does not report the removal
+    monkeypatch.setattr(key_values, "watch", KeyValueView)
+    monkeypatch.setattr(watched_session, "RESYNCHRONISATION_RETRY_S", 0.0)
+    serve_session_state(bus)
+    await key_values.put("sessions.s", b"1")
+    watched = WatchedSessions(bus, key_values, motion_store, StreamContext.create(clock))
+    _, transport = await join_viewer(watched)
+    await asyncio.gather(*watched._resync_tasks)
+    bus._responders.clear()
+    callbacks[0]()
+    for _ in range(20):
+        await asyncio.sleep(0)
+    # the owner may be unavailable
+    assert close_codes(transport) == []
+    await key_values.remove("sessions.s")
+    await asyncio.gather(*watched._resync_tasks)
+    assert close_codes(transport) == [NOT_FOUND]
+
+
+async def test_close_ends_all_subscriptions_and_tasks(
+    motion_store: MotionStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watched_session, "RESYNCHRONISATION_RETRY_S", 1_000_000.0)
+    bus, key_values = MemoryBus(), MemoryKeyValueStore()
+    serve_session_state(bus)
+    await key_values.put("sessions.s", b"1")
+    watched = WatchedSessions(bus, key_values, motion_store, StreamContext.create(clock))
+    viewer, transport = await join_viewer(watched)
+    bus._responders.clear()
+    watched._resynchronise(*watched._sessions.values())
+    await asyncio.sleep(0)
+    tasks = tuple(watched._resync_tasks)
+    assert tasks
+    await watched.close()
+    assert all(task.done() for task in tasks)
+    assert not bus._handlers.keys() & {f"session.s.{name}" for name in ("timeline", "presence", "overlay", "appear")}
+    # not an end of the session
+    await key_values.remove("sessions.s")
+    assert close_codes(transport) == []
+    viewer.on_close()

@@ -44,12 +44,13 @@ MAX_RESUME_AGE_US = 60_000_000
 def create_app(context: ServiceContext) -> FastAPI:
     """Return the ASGI application of the service."""
     stream = StreamContext.create(context.clock)
-    sessions = WatchedSessions(context.bus, context.motion_store, stream)
+    sessions = WatchedSessions(context.bus, context.key_values, context.motion_store, stream)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         metrics.register_metrics(context.metrics, stream.counters, sessions)
         yield
+        await sessions.close()
 
     app = FastAPI(title="Bunraku stream", lifespan=lifespan, openapi_url=None)
     app.state.multicast_sender = stream.sender
@@ -145,8 +146,11 @@ def create_app(context: ServiceContext) -> FastAPI:
                 connection.on_ended = stream.counters.add_viewer(
                     viewer, "session", context.authenticator.register_connection(access_of(socket), viewer.disconnect)
                 )
+                if watched.close_reason is not None:
+                    # it has ended during the handshake
+                    viewer.disconnect(watched.close_reason)
             finally:
-                sessions.close_if_empty(session)
+                sessions.close_if_empty(watched)
         except WebSocketDisconnect:
             # the client left during the handshake
             pass

@@ -13,6 +13,7 @@ import msgpack
 
 from bunraku.codec.container import StoredMotion
 from bunraku.messaging.bus import Bus, NoResponse, Subscription, is_subject_token
+from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, KeyValueStore
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.storage.motion_store import MotionStore
@@ -35,14 +36,17 @@ for three intervals, as they have died."""
 RESYNCHRONISATION_RETRY_S = 1.0
 """Interval at which the state of a session is requested again until its owner answers, seconds."""
 
+SESSION_ENDED = CloseConnection(NOT_FOUND, "Session ended", "a puppeteer has ended this session, or it was idle")
+
 _log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)
 class SessionSource:
-    """Sources of a session's messages and motions, and the name under which this replica counts its viewers."""
+    """Sources of a session's messages, record and motions, and the name under which this replica counts its viewers."""
 
     bus: Bus
+    key_values: KeyValueStore
     motion_store: MotionStore
     replica: str
 
@@ -57,6 +61,7 @@ class WatchedSession:
 
         `state` is the session's answer to the request for its state; `on_empty` is called when the last viewer leaves.
         """
+        self.id = session
         self._on_empty = on_empty
         self._source = source
         self._context = context
@@ -68,7 +73,8 @@ class WatchedSession:
         self._writable: MulticastGroup | None = None
         self._unwritable: list[ViewerConnection] = []
         self._motion: StoredMotion | None = None
-        self._close_reason: CloseConnection | None = None
+        self.close_reason: CloseConnection | None = None
+        """Reason why no viewer can be connected now."""
         self._motion_task: asyncio.Task[None] | None = None
         self._count_timer: asyncio.TimerHandle | None = None
         self._refresh_timer: asyncio.TimerHandle | None = None
@@ -89,8 +95,8 @@ class WatchedSession:
         """Wait until the session's motion is loaded; raise `CloseConnection` if it cannot be."""
         while self._motion_task is not None:
             await asyncio.wait((self._motion_task,))
-        if self._close_reason is not None:
-            raise self._close_reason
+        if self.close_reason is not None:
+            raise self.close_reason
 
     async def resynchronise(self) -> None:
         """Request the session's state and apply it: messages published without a subscription are lost.
@@ -136,10 +142,18 @@ class WatchedSession:
         """True if the session has no viewer here."""
         return not self._viewers
 
+    def end(self) -> None:
+        """Close the connections of all viewers, as the session has ended, and the subscriptions."""
+        self._disconnect_viewers(SESSION_ENDED)
+        self.close()
+
     def close(self) -> None:
-        """End the subscriptions."""
+        """End the subscriptions; the remaining viewers receive nothing more."""
         for subscription in self._subscriptions:
             subscription.unsubscribe()
+        for viewer in self._viewers:
+            viewer.group = None
+        self._viewers.clear()
         if self._motion_task is not None:
             self._motion_task.cancel()
         if self._count_timer is not None:
@@ -193,7 +207,7 @@ class WatchedSession:
                         CloseConnection(NOT_FOUND, "No such motion", f"there is no motion {motion_id[:40]!r}")
                     )
                     return
-            self._close_reason = None
+            self.close_reason = None
             self._set_motion(motion)
         except Exception:
             _log.exception("Loading the motion of %s failed; its viewers are disconnected", self._subject)
@@ -209,8 +223,8 @@ class WatchedSession:
             viewer.set_timeline(self._timeline, motion)
 
     def _disconnect_viewers(self, reason: CloseConnection) -> None:
-        self._close_reason = reason
-        for viewer in self._viewers:
+        self.close_reason = reason
+        for viewer in tuple(self._viewers):
             viewer.disconnect(reason)
 
     def _on_presence(self, message: bytes) -> None:
@@ -246,37 +260,53 @@ class WatchedSession:
 class WatchedSessions:
     """Sessions watched at this replica, opened with their first viewer and closed with their last."""
 
-    def __init__(self, bus: Bus, motion_store: MotionStore, context: StreamContext) -> None:
-        self._source = SessionSource(bus, motion_store, secrets.token_hex(6))
+    def __init__(self, bus: Bus, key_values: KeyValueStore, motion_store: MotionStore, context: StreamContext) -> None:
+        self._source = SessionSource(bus, key_values, motion_store, secrets.token_hex(6))
         self._context = context
         self._sessions: dict[str, WatchedSession] = {}
         self._resync_tasks: set[asyncio.Task[None]] = set()
-        bus.on_reconnect(lambda: self._resynchronise(*self._sessions.values()))
+        self._reconnects = bus.on_reconnect(lambda: self._resynchronise(*self._sessions.values()))
+        self._records: Subscription | None = None
+
+    async def close(self) -> None:
+        """End all subscriptions and tasks."""
+        self._reconnects.unsubscribe()
+        if self._records is not None:
+            self._records.unsubscribe()
+        for task in self._resync_tasks:
+            task.cancel()
+        await asyncio.gather(*self._resync_tasks, return_exceptions=True)
+        for watched in self._sessions.values():
+            watched.close()
+        self._sessions.clear()
 
     async def open(self, session: str) -> WatchedSession:
         """Return a session that is ready for viewers.
 
-        The caller must add a viewer before it awaits anything else, or call `close_if_empty`. Raises `NoResponse` if
+        The caller must add a viewer or call `close_if_empty`. Raises `NoResponse` if
         there is no such session, and `CloseConnection` if it cannot be watched.
         """
         if not is_subject_token(session):
             raise NoResponse(session)
+        if self._records is None:
+            self._records = self._source.key_values.watch().on_change(self._on_record)
         if session not in self._sessions:
             state = await self._source.bus.request(f"session.{session}.state")
             # another viewer may have opened it during the request
             if session not in self._sessions:
                 # the session outlives the request of its first viewer, and must not log that request's id
                 with request_id.bind(""):
-                    self._sessions[session] = WatchedSession(
-                        session, self._source, self._context, state, lambda: self.close_if_empty(session)
+                    opened = WatchedSession(
+                        session, self._source, self._context, state, lambda: self.close_if_empty(opened)
                     )
+                    self._sessions[session] = opened
                     # the state may have changed before the subscription
-                    self._resynchronise(self._sessions[session])
+                    self._resynchronise(opened)
         watched = self._sessions[session]
         try:
             await watched.wait_until_ready()
         except BaseException:
-            self.close_if_empty(session)
+            self.close_if_empty(watched)
             raise
         return watched
 
@@ -288,9 +318,9 @@ class WatchedSessions:
             stale = list(sessions)
             while stale := [session for session in stale if session in self._sessions.values()]:
                 for session in tuple(stale):
-                    with contextlib.suppress(NoResponse, BackendUnavailable):
-                        await session.resynchronise()
-                        stale.remove(session)
+                    with contextlib.suppress(BackendUnavailable):
+                        if await self._resynchronise_one(session):
+                            stale.remove(session)
                 # the owner may be unavailable now, and go on later without announcing itself
                 await asyncio.sleep(RESYNCHRONISATION_RETRY_S if stale else 0)
 
@@ -298,12 +328,32 @@ class WatchedSessions:
         self._resync_tasks.add(task)
         task.add_done_callback(self._resync_tasks.discard)
 
-    def close_if_empty(self, session: str) -> None:
+    async def _resynchronise_one(self, session: WatchedSession) -> bool:
+        """Apply the session's state, or its end; return False if its owner does not answer now."""
+        try:
+            await session.resynchronise()
+        except NoResponse:
+            if await self._source.key_values.get(f"{SESSION_KEY_PREFIX}.{session.id}") is not None:
+                return False
+            self._end(session)
+        return True
+
+    def _on_record(self, key: str, entry: KeyValueEntry | None) -> None:
+        """End a watched session whose record was removed."""
+        prefix, _, session = key.partition(".")
+        if prefix == SESSION_KEY_PREFIX and entry is None and session in self._sessions:
+            self._end(self._sessions[session])
+
+    def _end(self, session: WatchedSession) -> None:
+        if self._sessions.get(session.id) is session:
+            del self._sessions[session.id]
+            session.end()
+
+    def close_if_empty(self, session: WatchedSession) -> None:
         """Close a session that has no viewer here."""
-        watched = self._sessions.get(session)
-        if watched is not None and watched.is_empty:
-            watched.close()
-            del self._sessions[session]
+        if session.is_empty and self._sessions.get(session.id) is session:
+            session.close()
+            del self._sessions[session.id]
 
 
 def _parse_timeline(message: bytes) -> TimelineState:

@@ -362,6 +362,8 @@ export const JAPANESE_SERVER_MESSAGES = {
   "No room left": "空き容量がありません",
   "No such session": "その舞台は見つかりません",
   "there is no session {session}": "舞台{session}はありません",
+  "Session ended": "舞台は終わりました",
+  "a puppeteer has ended this session, or it was idle": "人形遣いが終えたか、長く使われていませんでした",
   "No such motion": "その演目は見つかりません",
   "there is no motion {motion}": "演目{motion}はありません",
   "Not available now": "ただいま利用できません",
