@@ -13,7 +13,7 @@ from pydantic import SecretStr
 from starlette.routing import Mount
 
 from bunraku.access.app import create_app as access
-from bunraku.http import problem_details
+from bunraku.http import authorization, problem_details
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.authorization import AuthorizationMiddleware, UndeclaredRequirement, collect_route_rules
 from bunraku.ik.app import create_app as ik
@@ -187,6 +187,46 @@ async def test_allowed_origins_get_cors_headers(tmp_path: Path) -> None:
                 answer = await http.get("/v1/motions", headers={"Origin": origin})
                 assert answer.status_code == 401
                 assert answer.headers.get("access-control-allow-origin") == allowed
+
+
+@asynccontextmanager
+async def serve_app(settings: Settings) -> AsyncIterator[httpx2.AsyncClient]:
+    async with (
+        compose_app(settings) as app,
+        httpx2.AsyncClient(transport=httpx2.ASGITransport(app), base_url="http://127.0.0.1") as http,
+    ):
+        yield http
+
+
+async def test_changes_of_one_subject_are_limited_on_every_route(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(authorization, "CHANGES_PER_S", 1e-6)
+    monkeypatch.setattr(authorization, "CHANGE_BURST", 8)
+    changes = [
+        ("POST", "/v1/sessions"),
+        ("PATCH", "/v1/sessions/none"),
+        ("DELETE", "/v1/sessions/none"),
+        ("POST", "/v1/sessions/none/recordings"),
+        ("POST", "/v1/shares"),
+        ("DELETE", "/v1/shares/" + "0" * 18),
+        ("DELETE", "/v1/motions/none"),
+        ("POST", "/v1/motions/none/performers"),
+    ]
+    first, second = (bearer_headers(make_token(Role.INGEST, name)) for name in ("first", "second"))
+    async with serve_app(Settings(data=tmp_path, secret=SecretStr(SECRET))) as http:
+        for method, path in changes:
+            assert (await http.request(method, path, headers=first)).status_code in (400, 404, 422)
+        for method, path in changes:
+            refused = await http.request(method, path, headers=first)
+            assert refused.status_code == 429
+            assert refused.json()["title"] == "Too many changes"
+            assert refused.headers["retry-after"] == "1"
+        assert (await http.get("/v1/sessions", headers=first)).status_code == 200
+        assert (await http.post("/v1/tickets", headers=first)).status_code == 201
+        assert (await http.delete("/v1/sessions/none", headers=second)).status_code == 404
+    async with serve_app(Settings(data=tmp_path / "open")) as http:
+        assert {(await http.delete("/v1/sessions/none")).status_code for _ in range(12)} == {404}
 
 
 async def test_tickets_count_towards_the_connection_rate(tmp_path: Path) -> None:

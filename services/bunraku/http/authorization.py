@@ -40,6 +40,8 @@ SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 """HTTP methods that change nothing (RFC 9110, section 9.2.1)."""
 CONNECT_BURST_S = 10
 """An address may open as many connections at once as the rate limit allows in this time, in seconds."""
+CHANGES_PER_S, CHANGE_BURST = 20.0, 200
+"""Rate of the requests of one subject that change something, at one process, and their number at once."""
 _LINK_NEEDED = "A link is needed"
 
 _log = logging.getLogger(__name__)
@@ -124,6 +126,7 @@ class AuthorizationMiddleware:
         self._connect_buckets = (
             KeyedTokenBuckets(settings.connects, settings.connects * CONNECT_BURST_S) if limited else None
         )
+        self._change_buckets = KeyedTokenBuckets(CHANGES_PER_S, CHANGE_BURST)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "websocket":
@@ -158,6 +161,8 @@ class AuthorizationMiddleware:
             if requirement.rate_limited:
                 self._limit_connect_rate(scope)
             scope[ACCESS_SCOPE_KEY] = await self._authorize(scope, headers, requirement, path_params, None)
+            if scope["method"] not in SAFE_METHODS:
+                self._limit_change_rate(scope[ACCESS_SCOPE_KEY], requirement)
         elif scope["path"].startswith(API_PREFIX):
             raise ProblemError(404, "Not Found", f"{scope['method']} {scope['path']}: Not Found")
         else:
@@ -234,6 +239,18 @@ class AuthorizationMiddleware:
         if not self._connect_buckets.take(client_network(scope["client"][0]), self._monotonic_seconds()):
             raise ProblemError(
                 429, "Too many connections", "your address connects too often", hint="try again in a second"
+            )
+
+    def _limit_change_rate(self, access: Access, requirement: Requirement) -> None:
+        """Count a request that changes something. Raises `ProblemError` 429 above the limit of its subject.
+
+        Requests of the role view change nothing that others share: they compute, or issue tickets.
+        """
+        if requirement.role in (None, Role.VIEW) or not self._authenticator.requires_token:
+            return
+        if not self._change_buckets.take(access.subject, self._monotonic_seconds()):
+            raise ProblemError(
+                429, "Too many changes", "your link or token sends changes too fast", hint="try again in a second"
             )
 
     def _match_route(self, path: str, method: str | None) -> tuple[RouteRule | None, dict[str, str]]:

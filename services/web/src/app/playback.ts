@@ -7,6 +7,9 @@ import { Viewer } from "../client/viewer";
 /** Longest time for which the seek bar shows the requested position before the timeline confirms it. */
 const SEEK_SETTLE_TIMEOUT_MS = 1200;
 
+/** Minimum time between two edits of a session: the server limits the changes of one subject. */
+const EDIT_INTERVAL_MS = 60;
+
 /**
  * Return the first running session. If there is none and `access` allows it, create one that plays the newest motion.
  * Returns null if there is no session and none can be created.
@@ -92,8 +95,8 @@ export class Playback {
   }
 
   /**
-   * Edit the timeline, for all viewers if it is a session's. One request is in flight at a time; edits made meanwhile
-   * are merged into the next one.
+   * Edit the timeline, for all viewers if it is a session's. One request is in flight at a time; edits made meanwhile,
+   * or within `EDIT_INTERVAL_MS`, are merged into the next one.
    */
   edit(change: SessionEdit): void {
     if (!this.isEditable) return;
@@ -121,6 +124,7 @@ export class Playback {
       } catch (error) {
         this.onEditError(error);
       }
+      await new Promise((resolve) => setTimeout(resolve, EDIT_INTERVAL_MS));
     }
     this.#editInFlight = false;
   }

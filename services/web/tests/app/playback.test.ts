@@ -82,3 +82,26 @@ test("seek by blocks moves by whole blocks within the motion", async () => {
   playback.close();
   FakeWebSocket.remove();
 });
+
+test("edits in quick succession are merged", async () => {
+  vi.useFakeTimers();
+  FakeWebSocket.install();
+  const bodies: unknown[] = [];
+  vi.stubGlobal("fetch", async (_: string, { body }: RequestInit) => {
+    bodies.push(JSON.parse(body as string));
+    return new Response("{}", { status: 200 });
+  });
+  const playback = new Playback("on", "Aiko", () => undefined, { access: new Access("https://stage.example") });
+  for (let position = 0; position < 100; position++) {
+    playback.edit({ position });
+    // a pointer that is dragged, on a server that answers at once
+    await vi.advanceTimersByTimeAsync(10);
+  }
+  await vi.advanceTimersByTimeAsync(200);
+  expect(bodies.length).toBeGreaterThan(2);
+  expect(bodies.length).toBeLessThanOrEqual(20);
+  expect(bodies.at(-1)).toEqual({ position: 99 });
+  playback.close();
+  FakeWebSocket.remove();
+  vi.useRealTimers();
+});
