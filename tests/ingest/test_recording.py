@@ -12,12 +12,12 @@ import pytest
 
 from bunraku.ingest.app import create_app
 from bunraku.ingest.motion import MotionOperation
-from bunraku.ingest.recording import RECORDING_SUBJECT, RecordingOperation, parse_recording_request
+from bunraku.ingest.recording import RecordingOperation, parse_recording_request
 from bunraku.ingest.source_file import SourceFile
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.marionette.input_log import InputLog
 from bunraku.messaging.bus import NoResponse
-from bunraku.messaging.recording_request import MAX_RECORDING_S, pack_camera
+from bunraku.messaging.recording_request import MAX_RECORDING_S, RECORDING_SUBJECT, pack_camera
 from bunraku.playout import timeline
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
@@ -135,6 +135,16 @@ async def test_recording_beyond_the_limit_gets_503(
     assert "motion" in recorded
     assert rejected["problem"]["status"] == 503
     assert "motion" in msgpack.unpackb(await operation.handle_message(b"order"))
+
+
+@pytest.mark.usefixtures("motion_id")
+async def test_lease_is_held_while_a_session_is_recorded(context: ServiceContext) -> None:
+    changes: list[str] = []
+    context.key_values.watch().on_change(lambda key, _: changes.append(key))
+    assert "motion" in await send_request(context, make_request())
+    # taken and released
+    assert changes.count("recordings.log") == 2
+    assert context.key_values.watch().entries == {}
 
 
 async def test_slow_recording_is_cancelled(context: ServiceContext, motion_id: str) -> None:

@@ -6,7 +6,7 @@ from contextlib import AsyncExitStack
 import pytest
 
 from bunraku.messaging.key_value import MemoryKeyValueStore
-from bunraku.messaging.lease import hold_lease
+from bunraku.messaging.lease import hold_lease, wait_until_abandoned
 from bunraku.messaging.replica_registry import ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
 
@@ -79,3 +79,19 @@ async def test_lease_of_a_stalled_holder_is_taken_after_the_timeout() -> None:
     begin = loop.time()
     async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
         assert loop.time() - begin > TIMING.timeout_s
+
+
+async def test_abandonment_is_noticed_while_the_holder_stays_registered() -> None:
+    store = MemoryKeyValueStore()
+    waiting = asyncio.create_task(wait_until_abandoned(store, "work", TIMING))
+    async with hold_lease(store, "work", TIMING, POLL_S):
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(asyncio.shield(waiting), 1.5)
+    with pytest.raises(TimeoutError):
+        await asyncio.wait_for(asyncio.shield(waiting), 0.1)
+    # a replica that is killed stays registered, without heartbeats
+    killed = ReplicaRegistry(store, TIMING)
+    await store.put("work", (await killed.register()).encode())
+    async with asyncio.timeout(20):
+        await waiting
+    assert list(store.watch().entries) == [killed.key, "work"]

@@ -12,8 +12,9 @@ from typing import Any, Protocol, TypeVar, cast
 from bunraku.http.authentication import Authenticator
 from bunraku.ingest.job_queue import JobQueue
 from bunraku.ingest.motion import MotionOperation
-from bunraku.ingest.recording import RECORDING_SUBJECT, RecordingOperation
+from bunraku.ingest.recording import RecordingOperation
 from bunraku.ingest.worker_slots import WorkerSlots
+from bunraku.messaging.recording_request import RECORDING_SUBJECT
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.metrics import Metrics
 from bunraku.runtime.settings import Settings

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import asyncio
 import errno
 import hashlib
+import random
+import shutil
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
+import asyncpg
 import httpx2
 import pytest
 
+from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.insufficient_storage import insufficient_storage, is_disk_full, translate_disk_full
 from bunraku.runtime.problem import ProblemError
+from bunraku.storage.catalogue_sql import SqlCatalogue
 from bunraku.storage.object_storage import ObjectStorage
-from tests.disks import mount_small_disk
+from bunraku.storage.record import CatalogueEntry
+from tests.disks import fill_disk, mount_small_disk
+from tests.processes import ServerProcess
 from tests.servers import make_bvh_clip, run_server
 
 
@@ -72,3 +83,94 @@ async def test_upload_to_a_full_disk_leaves_stored_motions_intact(small: Path, t
             assert retried.status_code == 201
             after = await http.get(f"/v1/motions/{stored.json()['id']}/blocks/0/0")
             assert hashlib.sha256(after.content).digest() == digest
+
+
+@contextmanager
+def run_refusing_store(status: int, code: str) -> Iterator[str]:
+    """Run an HTTP server that refuses every object as an S3 store does; return its address."""
+
+    class RefusingHandler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_PUT(self) -> None:
+            self.rfile.read(int(self.headers["Content-Length"]))
+            body = f"<?xml version='1.0'?>\n<Error>\n<Code>{code}</Code>\n<Message>no</Message></Error>".encode()
+            self.send_response(status)
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            self.wfile.write(body)
+
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+            """Log nothing."""
+
+    with ThreadingHTTPServer(("127.0.0.1", 0), RefusingHandler) as server:
+        thread = threading.Thread(target=server.serve_forever)
+        thread.start()
+        try:
+            yield f"http://127.0.0.1:{server.server_port}"
+        finally:
+            server.shutdown()
+            thread.join()
+
+
+@pytest.mark.parametrize(
+    ("status", "code", "is_full"),
+    [
+        (507, "XMinioStorageFull", True),
+        (507, "Unknown", True),
+        (400, "XMinioAdminBucketQuotaExceeded", True),
+        (403, "QuotaExceeded", True),
+        (403, "AccessDenied", False),
+        (503, "SlowDown", False),
+    ],
+)
+async def test_refusal_of_an_object_store_is_a_problem(
+    status: int, code: str, is_full: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with run_refusing_store(status, code) as address:
+        for name, value in (("ENDPOINT_URL", address), ("ACCESS_KEY_ID", "k"), ("SECRET_ACCESS_KEY", "s")):
+            monkeypatch.setenv(f"AWS_{name}", value)
+        objects = ObjectStorage("s3://bucket/prefix")
+        if is_full:
+            with pytest.raises(ProblemError) as raised:
+                await objects.put("a", b"1")
+            assert raised.value.status == 507
+        else:
+            with pytest.raises(BackendUnavailable):
+                await objects.put("a", b"1")
+
+
+async def _open_small_database(server: ServerProcess, folder: Path) -> str:
+    connection = await asyncpg.connect(host="127.0.0.1", port=server.port, user="postgres", database="postgres")
+    await connection.execute(f"CREATE TABLESPACE small LOCATION '{folder}'")
+    await connection.execute("CREATE DATABASE small TABLESPACE small")
+    await connection.close()
+    return f"postgresql://postgres@127.0.0.1:{server.port}/small"
+
+
+async def _drop_small_database(server: ServerProcess) -> None:
+    connection = await asyncpg.connect(host="127.0.0.1", port=server.port, user="postgres", database="postgres")
+    await connection.execute("DROP DATABASE IF EXISTS small WITH (FORCE)")
+    await connection.execute("DROP TABLESPACE IF EXISTS small")
+    await connection.close()
+
+
+async def test_full_disk_of_postgresql_is_a_problem(postgres_server: ServerProcess) -> None:
+    with mount_small_disk(postgres_server.folder / "small", "size=24m,mode=777") as disk:
+        shutil.chown(disk, postgres_server.folder.owner())
+        catalogue = await SqlCatalogue.open(await _open_small_database(postgres_server, disk))
+        try:
+            await catalogue.add_motion(CatalogueEntry("kept", 1, {}))
+            filler = await asyncio.to_thread(fill_disk, disk)
+            # incompressible, so that it needs new pages
+            large = CatalogueEntry("large", 2, {"name": random.Random(1).randbytes(400_000).hex()})
+            with pytest.raises(ProblemError) as raised:
+                await catalogue.add_motion(large)
+            assert raised.value.status == 507
+            assert raised.value.detail.startswith("the catalogue")
+            assert [entry.id for entry in (await catalogue.list_motions(9))[0]] == ["kept"]
+            filler.unlink()
+            assert await catalogue.add_motion(large)
+        finally:
+            await catalogue.close()
+            await _drop_small_database(postgres_server)

@@ -26,10 +26,11 @@ from bunraku.ingest.motion import MotionOperation, create_motion_job
 from bunraku.ingest.performers import PerformersOperation, PerformersRequest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
-from bunraku.ingest.recording import RECORDING_SUBJECT, RecordingOperation
+from bunraku.ingest.recording import RecordingOperation
 from bunraku.ingest.scene import SceneOperation
 from bunraku.ingest.upload import UploadReceiver
 from bunraku.ingest.worker_slots import WorkerSlots
+from bunraku.messaging.recording_request import RECORDING_SUBJECT
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import InvalidCursor

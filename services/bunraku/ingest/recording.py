@@ -19,13 +19,18 @@ from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.persistence import check_quota, store_motion
 from bunraku.ingest.result import JobResult, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
-from bunraku.messaging.recording_request import MAX_RECORDING_S, RECORDING_FPS, RecordingRequest
+from bunraku.messaging.lease import hold_lease
+from bunraku.messaging.recording_request import (
+    MAX_RECORDING_S,
+    RECORDING_FPS,
+    RECORDING_KEY_PREFIX,
+    RecordingRequest,
+)
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import clean_text
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import CatalogueEntry
 
-RECORDING_SUBJECT = "ingest.keep"
 MAX_ACTIVE_RECORDINGS = 8
 """Recordings in progress at the same time; further ones get 503."""
 MAX_RECORDINGS_PER_SUBJECT = 2
@@ -84,7 +89,8 @@ class RecordingOperation:
         await check_quota(self._context, request.subject)
         motions = await self._load_motions(log)
         motion_id = derive_motion_id(secrets.token_bytes(32))
-        async with self._worker_slots.hold(request.subject):
+        lease = hold_lease(self._context.key_values, f"{RECORDING_KEY_PREFIX}.{request.log}")
+        async with lease, self._worker_slots.hold(request.subject):
             outcome = await self._worker_slots.run_job(
                 JobKind.RECORDING, (motion_id, request, log, motions), self._timeout_s
             )

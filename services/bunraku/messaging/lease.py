@@ -7,7 +7,7 @@ import contextlib
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
-from bunraku.messaging.key_value import KeyValueStore, RevisionConflict
+from bunraku.messaging.key_value import KeyValueEntry, KeyValueStore, RevisionConflict
 from bunraku.messaging.replica_registry import ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
 
@@ -27,20 +27,40 @@ async def hold_lease(
     replica whose event loop is blocked for longer than the timeout loses the lease without noticing: use leases to
     avoid duplicate work, not to protect data. Raise `BackendUnavailable` if the store is unavailable at the start.
     """
-    holder = ReplicaRegistry(key_values, timing)
-    await holder.register()
-    heartbeats = asyncio.create_task(holder.run(), name=f"lease {key}")
-    try:
+    async with _register(key_values, key, timing) as holder:
         revision = await _acquire_lease(key_values, key, holder, poll_s)
         try:
             yield
         finally:
             with contextlib.suppress(RevisionConflict, BackendUnavailable):
                 await key_values.remove(key, revision)
+
+
+async def wait_until_abandoned(key_values: KeyValueStore, key: str, timing: ReplicaTiming = LEASE_TIMING) -> None:
+    """Wait until the heartbeats of the holder of the lease at `key` have stopped.
+
+    Wait for a holder first. Raise `BackendUnavailable` if the store is unavailable at the start.
+    """
+    async with _register(key_values, key, timing) as observer:
+        entries, has_observed = key_values.watch().entries, asyncio.Event()
+        observer.on_heartbeat(has_observed.set)
+        while key not in entries or observer.is_alive(_holder_of(entries[key])):
+            has_observed.clear()
+            await has_observed.wait()
+
+
+@asynccontextmanager
+async def _register(key_values: KeyValueStore, key: str, timing: ReplicaTiming) -> AsyncIterator[ReplicaRegistry]:
+    """Register a replica, which observes the others, inside the block."""
+    replica = ReplicaRegistry(key_values, timing)
+    await replica.register()
+    heartbeats = asyncio.create_task(replica.run(), name=f"lease {key}")
+    try:
+        yield replica
     finally:
         heartbeats.cancel()
         await asyncio.wait((heartbeats,))
-        await holder.close()
+        await replica.close()
 
 
 async def _acquire_lease(key_values: KeyValueStore, key: str, holder: ReplicaRegistry, poll_s: float) -> int:
@@ -50,6 +70,11 @@ async def _acquire_lease(key_values: KeyValueStore, key: str, holder: ReplicaReg
         with contextlib.suppress(RevisionConflict):
             if current is None:
                 return await key_values.put(key, holder.id.encode(), 0)
-            if not holder.is_alive(current.value.decode("ascii", "replace")):
+            if not holder.is_alive(_holder_of(current)):
                 return await key_values.put(key, holder.id.encode(), current.revision)
         await asyncio.sleep(poll_s)
+
+
+def _holder_of(entry: KeyValueEntry) -> str:
+    """Return the id of the replica that holds a lease."""
+    return entry.value.decode("ascii", "replace")

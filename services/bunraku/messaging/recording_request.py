@@ -19,6 +19,11 @@ MAX_RECORDING_S = 600
 MAX_CAMERA_KEYFRAMES = 36_001
 """Maximum number of camera keyframes: one per frame of the longest recording."""
 
+RECORDING_SUBJECT = "ingest.keep"
+"""Subject of the requests."""
+RECORDING_KEY_PREFIX = "recordings"
+"""Prefix of `recordings.{log}`: lease of the replica that records a session's log."""
+
 CAMERA_VALUES = 8
 """Values of a camera keyframe: clock time (microseconds), position and gaze point (metres), vertical field of view
 (radians)."""

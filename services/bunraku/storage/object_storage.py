@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 from collections.abc import AsyncIterator, Awaitable, Callable
 from datetime import timedelta
 from pathlib import Path
@@ -20,6 +21,8 @@ MIN_THROUGHPUT_BYTES_PER_S = 1 << 20
 """Throughput below which an object store counts as unavailable, in bytes per second."""
 CONCURRENT_HEAD_REQUESTS = 16
 """Requests for the sizes of objects that are sent to a remote store at the same time."""
+_STORE_FULL = re.compile(r"status code: 507\b|<Code>\w*(?:QuotaExceeded|StorageFull)</Code>")
+"""Errors of an S3 store without space: status 507 (RFC 4918, section 11.5), and codes of MinIO and Ceph."""
 
 Result = TypeVar("Result")
 
@@ -133,6 +136,8 @@ class ObjectStorage:
         try:
             return await self._timeout.wait(request, BACKEND_TIMEOUT_S + transfer_bytes / MIN_THROUGHPUT_BYTES_PER_S)
         except BaseError as error:
+            if _STORE_FULL.search(str(error)):
+                raise insufficient_storage("the library") from error
             raise BackendUnavailable("the library", _error_detail(error)) from error
 
 
