@@ -9,7 +9,6 @@ import webbrowser
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Annotated, Any
-from urllib.parse import urlsplit
 
 import typer
 from rich.text import Text
@@ -23,6 +22,7 @@ from bunraku.cli_access import (
     share,
     token,
 )
+from bunraku.cli_bench import bench
 from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
     DEFAULT_SERVER,
@@ -30,11 +30,11 @@ from bunraku.terminal import (
     ServerOption,
     TokenOption,
     err,
-    find_resource_kind,
     out,
     parse_resource_address,
     print_plain,
     print_statistics,
+    resolve_stream_url,
     run_request,
 )
 
@@ -46,6 +46,7 @@ app = typer.Typer(
 )
 app.command()(token)
 app.command()(share)
+app.add_typer(bench, name="bench")
 
 MotionArgument = Annotated[str, typer.Argument(help="Id or address of a motion.")]
 ResourceArgument = Annotated[str, typer.Argument(help="Id or address of a motion or session.")]
@@ -256,7 +257,7 @@ def watch(
 
     async def request() -> dict[str, Any]:
         async with Client(server, token) as client:
-            viewer = Viewer(await _resolve_stream_url(client, url), token=token)
+            viewer = Viewer(await resolve_stream_url(client, url), token=token)
         return (await viewer.watch(seconds)).as_json()
 
     try:
@@ -295,62 +296,6 @@ def keep(
         out.print_json(data=motion)
         return
     print_plain(f"Recorded {motion['duration']:.1f} s as {motion['id']}: {motion['name']}")
-
-
-bench = typer.Typer(help="Load-test a server.", no_args_is_help=True)
-app.add_typer(bench, name="bench")
-
-
-@bench.callback()
-def _bench() -> None:
-    """Load-test a server."""
-    # without a callback, typer turns a group with a single command into that command
-
-
-@bench.command("viewers")
-def bench_viewers(
-    viewers: Annotated[int, typer.Option("--n", help="Number of viewers.", min=1, max=100_000)] = 200,
-    url: Annotated[
-        str | None,
-        typer.Option("--url", help="Id or address of a motion or session; default: the first session."),
-    ] = None,
-    seconds: Annotated[float, typer.Option(help="Duration.", min=0.1, max=86400)] = 20.0,
-    joins: Annotated[float, typer.Option(help="Viewers that connect per second.", min=0.1, max=10_000)] = 200.0,
-    server: ServerOption = DEFAULT_SERVER,
-    token: TokenOption = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Connect many viewers at once and print their statistics."""
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
-
-    from bunraku.client.api import Client
-    from bunraku.client.load_generator import FileLimitExceeded, run_load
-
-    async def request() -> dict[str, Any]:
-        async with Client(server, token) as client:
-            address = url or await client.first_session()
-            if address is None:
-                raise typer.BadParameter(f"no session is open at {server}; name a motion", param_hint="--url")
-            stream = await _resolve_stream_url(client, address)
-        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-        with Progress(*columns, console=err, disable=as_json or not err.is_terminal, transient=True) as progress:
-            task = progress.add_task("joining", total=1)
-
-            def on_progress(stage: str, share: float) -> None:
-                progress.update(task, description=stage, completed=share)
-
-            return (
-                await run_load(stream, viewers, seconds, joins_per_second=joins, token=token, on_progress=on_progress)
-            ).as_json()
-
-    try:
-        statistics = run_request(request, server)
-    except FileLimitExceeded as error:
-        err.print(f"Too many viewers for one process: {error}")
-        raise typer.Exit(1) from None
-    print_statistics(statistics, as_json)
-    if statistics["joined"] == 0:
-        raise typer.Exit(1)
 
 
 @app.command()
@@ -408,19 +353,6 @@ def _send_file(
                 return await send(client, lambda sent, size: on_progress("sending", sent / size), on_progress)
 
     return run_request(request, server)
-
-
-async def _resolve_stream_url(client: Any, address: str) -> str:
-    """Return the WebSocket URL of a motion or session, given by its id or address."""
-    from bunraku.client.api import Client
-
-    if urlsplit(address).scheme in ("ws", "wss"):
-        return address
-    base, kind, resource_id = parse_resource_address(address)
-    if base is not None:
-        return Client(base).socket_url(f"/v1/{kind}/{resource_id}/stream")
-    socket_url: str = client.socket_url(f"/v1/{await find_resource_kind(client, resource_id)}/{resource_id}/stream")
-    return socket_url
 
 
 if __name__ == "__main__":

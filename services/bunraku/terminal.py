@@ -104,6 +104,18 @@ async def find_resource_kind(client: Client, resource_id: str) -> str:
     return "sessions"
 
 
+async def resolve_stream_url(client: Client, address: str) -> str:
+    """Return the WebSocket URL of a motion or session, given by its id or address."""
+    from bunraku.client.api import Client
+
+    if urlsplit(address).scheme in ("ws", "wss"):
+        return address
+    base, kind, resource_id = parse_resource_address(address)
+    if base is not None:
+        return Client(base).socket_url(f"/v1/{kind}/{resource_id}/stream")
+    return client.socket_url(f"/v1/{await find_resource_kind(client, resource_id)}/{resource_id}/stream")
+
+
 def run_request(request: Callable[[], Awaitable[Result]], server: str) -> Result:
     """Return the result of `request`. If it fails, print the error and raise `typer.Exit`."""
     import httpx2

@@ -23,13 +23,13 @@ from bunraku.playout.overlay_buffer import pack_joints
 from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
+from bunraku.session.presence import PRESENCE_BURST
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import (
     EDIT_LEAD_US,
     FRAME_INTERVAL_US,
     FRAMES_PER_MESSAGE,
-    PRESENCE_BURST,
     SessionStart,
     Stage,
     load_bend_tables,

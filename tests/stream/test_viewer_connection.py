@@ -12,9 +12,10 @@ from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
 from bunraku.stream.context import StreamContext
+from bunraku.stream.edit_queue import EDIT_INTERVAL_US
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS
 from bunraku.stream.track_selection import ViewerOptions
-from bunraku.stream.viewer_connection import EDIT_INTERVAL_US, ViewerConnection
+from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from bunraku.wire.messages import (

@@ -11,7 +11,8 @@ from bunraku.codec.motion_encoder import encode_motion
 from bunraku.playout import timeline
 from bunraku.runtime.clock import clock
 from bunraku.stream.context import StreamContext
-from bunraku.stream.viewer_connection import LOW_RTT_CHECK_INTERVAL_US, ViewerConnection
+from bunraku.stream.flow_control import LOW_RTT_CHECK_INTERVAL_US
+from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.link import LinkSample
 from bunraku.wire.messages import Choice, Data, Ping, Pong, TimelineState

@@ -25,14 +25,13 @@ from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_joints
-from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
+from bunraku.session.presence import PresencePublisher
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stall import EventLoopStallCompensation
-from bunraku.session.viewer_counts import ViewerCounts
 from bunraku.wire import messages
 from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Refusal, Release, TimelineState, Welcome
 from bunraku.wire.overlay import Overlay
@@ -46,11 +45,6 @@ FRAMES_PER_MESSAGE = 2
 """Frames of one message: packets, not bytes, fill a constrained link."""
 MAX_CATCH_UP_FRAMES = 6
 """Frames published late after a stall; earlier ones are skipped."""
-PRESENCES_PER_S, PRESENCE_BURST = 20.0, 40
-"""Rate of Presence messages, each of which goes to every viewer, and their number at once: a puppeteer may cause a
-change with every message."""
-VIEWER_COUNT_INTERVAL_S = 0.5
-"""Interval between two publications of the viewer count."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,16 +86,12 @@ class Stage:
         self._timelines = timeline.TimelineHistory()
         self._timelines.put(start.timeline)
         self.puppeteers = PuppeteerRoster()
-        self._viewer_counts = ViewerCounts(clock)
-        self._viewer_count_timer: asyncio.TimerHandle | None = None
-        self._presence_rate = TokenBucket(PRESENCES_PER_S, PRESENCE_BURST)
-        self._presence_timer: asyncio.TimerHandle | None = None
+        self.presence_publisher = PresencePublisher(self._send_presence, clock)
         self._has_grants = asyncio.Event()
         self._stall_compensation = EventLoopStallCompensation()
         self._sequence = 0
         self._phase_us = secrets.randbelow(FRAMES_PER_MESSAGE * FRAME_INTERVAL_US)
         self._last_overlay: bytes | None = None
-        self.last_active_us = clock()
         self.log = InputLog(start.motion.id)
         self.log.add_timeline(self.timeline)
         self._marionettes = Marionettes(_performer_figures(start.motion), recorder=self.log, solver=solver)
@@ -116,9 +106,7 @@ class Stage:
 
     async def close(self) -> None:
         """Stop the stage; its puppeteers receive nothing more."""
-        for timer in (self._viewer_count_timer, self._presence_timer):
-            if timer is not None:
-                timer.cancel()
+        self.presence_publisher.close()
         self._tick_task.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await self._tick_task
@@ -140,7 +128,7 @@ class Stage:
         """Publish the state of a session that was another replica's: no limb is held any more."""
         self._bus.publish(f"session.{self.id}.appear", b"")
         self._bus.publish(f"session.{self.id}.timeline", self.timeline.pack())
-        self._publish_presence()
+        self.presence_publisher.publish()
         self._sequence += 1
         self._bus.publish(
             f"session.{self.id}.overlay", Overlay(self._sequence, self._clock() + OVERLAY_LEAD_US, {}).pack()
@@ -149,18 +137,16 @@ class Stage:
     @property
     def participant_count(self) -> int:
         """Number of viewers and puppeteers."""
-        return self._viewer_counts.total + len(self.puppeteers)
+        return self.presence_publisher.viewer_count + len(self.puppeteers)
+
+    @property
+    def last_active_us(self) -> int:
+        """Clock time of the last change of viewers, puppeteers or limbs."""
+        return self.presence_publisher.last_change_us
 
     def is_idle(self, now: int, duration_us: int) -> bool:
         """Return whether the session has had neither viewers nor puppeteers for `duration_us`."""
         return self.participant_count == 0 and now - self.last_active_us >= duration_us
-
-    def expire_viewer_counts(self, timeout_us: int, stalled_us: int) -> None:
-        """Forget the viewers of silent stream replicas, as `ViewerCounts.expire` does."""
-        before = self._viewer_counts.total
-        self._viewer_counts.expire(timeout_us, stalled_us)
-        if self._viewer_counts.total != before:
-            self._schedule_presence()
 
     @property
     def holders(self) -> tuple[str | None, ...]:
@@ -172,7 +158,7 @@ class Stage:
         """Viewer count, puppeteers, limb holders and requests for limbs."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         asks = [list(limb) for limb in self._ownership.asks()]
-        return Presence(self._viewer_counts.total, puppeteers, list(self.holders), asks)
+        return Presence(self.presence_publisher.viewer_count, puppeteers, list(self.holders), asks)
 
     def plan_edit(self, edit: SessionEdit, motion: StoredMotion | None) -> TimelineState | None:
         """Return the timeline after an edit, due `EDIT_LEAD_US` from now; None if the edit changes nothing.
@@ -196,7 +182,7 @@ class Stage:
             self._change_motion(motion)
         self._publish_timeline(state)
         if len(self.holders) != len(before):
-            self._publish_presence()
+            self.presence_publisher.publish()
 
     def _change_motion(self, motion: StoredMotion) -> None:
         now = self._clock()
@@ -214,7 +200,7 @@ class Stage:
         """
         puppeteer = self.puppeteers.join(puppeteer_id, name, send, self._clock(), subject)
         puppeteer.send(Welcome(puppeteer.id, puppeteer.colour, OVERLAY_LEAD_US).pack())
-        self._publish_presence()
+        self.presence_publisher.publish()
         return puppeteer
 
     def leave(self, puppeteer: Puppeteer) -> None:
@@ -223,7 +209,7 @@ class Stage:
         now = self._clock()
         self._ownership.leave(puppeteer.id, now)
         self._grant_free_limbs(now)
-        self._publish_presence()
+        self.presence_publisher.publish()
 
     def receive(self, puppeteer: Puppeteer, message: messages.Message | None) -> None:
         """Apply a message of a puppeteer's controller."""
@@ -234,12 +220,12 @@ class Stage:
                 puppeteer.send(Refusal(message.limb, answer.reason, answer.holder).pack())
             else:
                 self._send_grant(puppeteer.id, answer)
-                self._publish_presence()
+                self.presence_publisher.publish()
         elif isinstance(message, Release):
             puppeteer.granted_limbs.discard(message.limb)
             if self._ownership.release(message.limb, puppeteer.id, message.epoch, now):
                 self._grant_free_limbs(now)
-                self._publish_presence()
+                self.presence_publisher.publish()
         elif isinstance(message, Alive):
             self._ownership.keep_alive(puppeteer.id, message.limbs, now)
             holders = self.holders
@@ -250,7 +236,7 @@ class Stage:
             if message.wanted and self._asks_under_another_name(puppeteer, message.limb):
                 return
             if self._ownership.ask(message.limb, puppeteer.id, message.wanted, now):
-                self._publish_presence()
+                self.presence_publisher.publish()
         elif isinstance(message, Input):
             self._receive_input(puppeteer, message, now)
 
@@ -295,20 +281,6 @@ class Stage:
         self.log.add_timeline(state)
         self._bus.publish(f"session.{self.id}.timeline", state.pack())
 
-    def _publish_presence(self) -> None:
-        """Publish the presence, or together with later changes if there were many just now."""
-        self.last_active_us = self._clock()
-        if self._presence_rate.take(self.last_active_us * 1e-6):
-            self._send_presence()
-        elif self._presence_timer is None:
-            self._presence_timer = asyncio.get_running_loop().call_later(
-                1 / PRESENCES_PER_S, self._publish_late_presence
-            )
-
-    def _publish_late_presence(self) -> None:
-        self._presence_timer = None
-        self._publish_presence()
-
     def _send_presence(self) -> None:
         packed = self.presence.pack()
         self._bus.publish(f"session.{self.id}.presence", packed)
@@ -320,26 +292,7 @@ class Stage:
         return packed
 
     def _receive_viewer_count(self, message: bytes) -> None:
-        before = self._viewer_counts.total
-        self._viewer_counts.report(*msgpack.unpackb(message))
-        if self._viewer_counts.total != before:
-            self._schedule_presence()
-
-    def _schedule_presence(self) -> None:
-        """Publish the viewer count now, or after the interval if it was published just now.
-
-        Each stream replica reports its own count, and every publication goes to all viewers.
-        """
-        if self._viewer_count_timer is None:
-            self._publish_presence()
-            self._viewer_count_timer = asyncio.get_running_loop().call_later(
-                VIEWER_COUNT_INTERVAL_S, self._publish_changed_count, self._viewer_counts.total
-            )
-
-    def _publish_changed_count(self, published_count: int) -> None:
-        self._viewer_count_timer = None
-        if published_count != self._viewer_counts.total:
-            self._schedule_presence()
+        self.presence_publisher.report_viewers(*msgpack.unpackb(message))
 
     async def _run_ticks(self) -> None:
         while True:
@@ -394,7 +347,7 @@ class Stage:
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
         if self._grant_free_limbs(now) or lost:
-            self._publish_presence()
+            self.presence_publisher.publish()
         frame_overlays: list[OverlayJoints] = []
         for frame in frames:
             due = self._frame_time_us(frame) + OVERLAY_LEAD_US

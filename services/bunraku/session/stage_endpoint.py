@@ -176,7 +176,7 @@ class StageEndpoint:
             now = self._clock()
             # while the event loop was blocked, no heartbeat could be received
             stalled_us = max(now - begin - round(PUPPETEER_HEARTBEAT_S * 1e6), 0)
-            self.stage.expire_viewer_counts(VIEWER_COUNT_TIMEOUT_US, stalled_us)
+            self.stage.presence_publisher.expire_viewer_counts(VIEWER_COUNT_TIMEOUT_US, stalled_us)
             for puppeteer in self.stage.puppeteers:
                 puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:

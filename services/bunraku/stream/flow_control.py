@@ -27,6 +27,13 @@ BLOCK_CREDIT_SHARE = 0.3
 MAX_BLOCK_CREDIT_S = 0.2
 """Time for which that share may accumulate, seconds: several consecutive blocks would delay overlays."""
 
+BULK_QUEUE_US = 200_000
+"""Additional send queue allowed for non-live data on a constrained link, in microseconds."""
+HIGH_RTT_CHECK_INTERVAL_US = 250_000
+"""Interval between reassessments of an unchecked high-RTT link, microseconds."""
+LOW_RTT_CHECK_INTERVAL_US = 4_000_000
+"""Interval between reassessments of a low-RTT link, microseconds: the system calls cost as much as a block."""
+
 
 class Link(Protocol):
     """Link whose send queue can be observed; implemented in `bunraku.websocket.link`."""
@@ -71,6 +78,7 @@ class LinkState(Enum):
         self.skips_overlay_check = skips_overlay_check
         # plain attributes: access to an enum's members by name is slow in Python 3.11, and this runs for each message
         self.is_unlimited = skips_overlay_check and not is_high_rtt
+        self.check_interval_us = LOW_RTT_CHECK_INTERVAL_US if self.is_unlimited else HIGH_RTT_CHECK_INTERVAL_US
 
     @classmethod
     def initial(cls, rtt_us: int) -> LinkState:

@@ -21,7 +21,8 @@ from bunraku.codec.container import StoredMotion
 from bunraku.playout import timeline
 from bunraku.stream.context import StreamContext
 from bunraku.stream.counters import TIMEOUT_REASON
-from bunraku.stream.flow_control import FlowControl, Link
+from bunraku.stream.edit_queue import EditQueue
+from bunraku.stream.flow_control import BULK_QUEUE_US, FlowControl, Link
 from bunraku.stream.motion_delivery import OVERLAY_SHARING_US, MotionFeed
 from bunraku.stream.quiet_period import QuietPeriod
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, SendQueue
@@ -35,16 +36,8 @@ from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Data, Edit, Ping, Report, TimelineState, unpack
 from bunraku.wire.overlay import drop_earlier_frames
 
-BULK_QUEUE_US = 200_000
-"""Additional send queue allowed for non-live data on a constrained link, in microseconds."""
 WRITE_BATCH_BYTES = 16_384
 """Approximate size of one write of blocks."""
-EDIT_INTERVAL_US = 50_000
-"""Minimum time between two edits of a viewer's own timeline; those in between are combined, microseconds."""
-HIGH_RTT_CHECK_INTERVAL_US = 250_000
-"""Interval between reassessments of an unchecked high-RTT link, microseconds."""
-LOW_RTT_CHECK_INTERVAL_US = 4_000_000
-"""Interval between reassessments of a low-RTT link, microseconds: the system calls cost as much as a block."""
 
 _log = logging.getLogger(__name__)
 _NO_FLOW_CONTROL = FlowControl(None, lambda: 0)
@@ -66,8 +59,8 @@ class ViewerConnection:
     """Sending side of one viewer. Everything is queued until `open` is called."""
 
     __slots__ = (
-        "_context", "_feed", "_flow", "_has_own_timeline", "_heartbeat", "_next_edit_at", "_next_flow_check_at",
-        "_overlay_waited_at", "_pending_edit", "_queue", "_quiet_period", "_sync", "_timer", "connection", "group",
+        "_context", "_edits", "_feed", "_flow", "_has_own_timeline", "_heartbeat", "_next_flow_check_at",
+        "_overlay_waited_at", "_queue", "_quiet_period", "_sync", "_timer", "connection", "group",
     )  # fmt: skip
 
     def __init__(self, context: StreamContext, options: ViewerOptions | None = None) -> None:
@@ -83,8 +76,7 @@ class ViewerConnection:
         self._quiet_period = QuietPeriod()
         self._flow = _NO_FLOW_CONTROL
         self._next_flow_check_at = 0
-        self._pending_edit: Edit | None = None
-        self._next_edit_at = 0
+        self._edits = EditQueue()
         self._timer: asyncio.TimerHandle | None = None
         self.group: ViewerGroup | None = None
         self.connection: WebSocketConnection = CLOSED_CONNECTION
@@ -167,7 +159,7 @@ class ViewerConnection:
             if delivery.process_report(received, now) or now >= self._next_flow_check_at:
                 self._context.scheduler.schedule(self, 0)
         elif isinstance(received, Edit) and self._has_own_timeline:
-            self._pending_edit = received if self._pending_edit is None else _combine(self._pending_edit, received)
+            self._edits.add(received)
             self._apply_edit(self._context.clock())
 
     def on_pong(self, payload: bytes) -> bool:
@@ -240,8 +232,7 @@ class ViewerConnection:
         flow.reassess()
         if flow.state.skips_overlay_check != skipped_check:
             self._invalidate_writable()
-        interval = LOW_RTT_CHECK_INTERVAL_US if flow.state.is_unlimited else HIGH_RTT_CHECK_INTERVAL_US
-        self._next_flow_check_at = now + interval - 1
+        self._next_flow_check_at = now + flow.state.check_interval_us - 1
 
     def _send_unlimited(self, now: int) -> None:
         """Send everything that is due."""
@@ -360,8 +351,8 @@ class ViewerConnection:
     def _next_tick(self) -> int:
         """Return the clock time of the next tick: for a block, the heartbeat or a check of the link."""
         due = self._heartbeat.next_check(self.connection)
-        if self._pending_edit is not None:
-            due = min(due, self._next_edit_at)
+        if (edit_at := self._edits.due_at) is not None:
+            due = min(due, edit_at)
         if not self.connection.is_writable:
             return due
         if self._sync.group is not None:
@@ -371,7 +362,7 @@ class ViewerConnection:
             # a constrained link sends just in time, so its blocks are not spread
             due = min(due, next_block_at + (self._sync.phase if state.is_unlimited else 0))
         if state.is_high_rtt and state.skips_overlay_check:
-            due = min(due, self._context.clock() + HIGH_RTT_CHECK_INTERVAL_US)
+            due = min(due, self._context.clock() + state.check_interval_us)
         return due
 
     def _set_timer(self, delay_us: int) -> None:
@@ -398,21 +389,12 @@ class ViewerConnection:
 
     def _apply_edit(self, now: int) -> None:
         """Edit the viewer's own timeline, or schedule that if it was edited just now."""
-        edit, state, delivery = self._pending_edit, self._feed.state, self._feed.delivery
-        if edit is None or state is None or delivery is None:
+        state, delivery = self._feed.state, self._feed.delivery
+        if state is None or delivery is None:
             return
-        if now < self._next_edit_at:
-            self._context.scheduler.schedule(self, self._next_edit_at)
+        if (edit := self._edits.take(now)) is None:
+            if (edit_at := self._edits.due_at) is not None:
+                self._context.scheduler.schedule(self, edit_at)
             return
-        self._pending_edit, self._next_edit_at = None, now + EDIT_INTERVAL_US
         state = timeline.edit(state, now, playing=edit.playing, position=edit.position, loop=edit.loop)
         self.set_timeline(state, delivery.motion)
-
-
-def _combine(earlier: Edit, later: Edit) -> Edit:
-    """Return an edit with the effect of both."""
-    return Edit(
-        playing=earlier.playing if later.playing is None else later.playing,
-        position=earlier.position if later.position is None else later.position,
-        loop=earlier.loop if later.loop is None else later.loop,
-    )
