@@ -197,6 +197,9 @@ async def test_records_of_earlier_and_later_releases_are_read() -> None:
     assert SessionRecord.unpack(msgpack.packb(["owner", 5, state])) == SessionRecord("owner", 5, state, "")
     later = SessionRecord.unpack(msgpack.packb(["owner", 5, state, "aiko", {"more": 1}]))
     assert later == SessionRecord("owner", 5, state, "aiko")
+    # what a replica of the first release can read
+    assert msgpack.unpackb(SessionRecord("owner", 5, state).pack()) == ["owner", 5, state]
+    assert msgpack.unpackb(SessionRecord("owner", 5, state, "aiko").pack()) == ["owner", 5, state, "aiko"]
     for wrong in (b"its last timeline", msgpack.packb(["owner", 5]), msgpack.packb(["owner", 5, b"\x03"])):
         with pytest.raises((ValueError, TypeError)):
             SessionRecord.unpack(wrong)

@@ -329,3 +329,18 @@ async def test_close_ends_all_subscriptions_and_tasks(
     await key_values.remove("sessions.s")
     assert close_codes(transport) == []
     viewer.on_close()
+
+
+async def test_state_of_a_later_release_is_understood(motion_store: MotionStore) -> None:
+    bus, key_values = MemoryBus(), MemoryKeyValueStore()
+
+    async def answer(_: bytes) -> bytes:
+        packed: bytes = msgpack.packb([STATE.pack(), PRESENCE.pack(), None, {"more": 1}])
+        return packed
+
+    bus.serve("session.s.state", answer)
+    watched = WatchedSessions(bus, key_values, motion_store, StreamContext.create(clock))
+    _, transport = await join_viewer(watched)
+    await asyncio.gather(*watched._resync_tasks)
+    assert STATE in transport.messages
+    await watched.close()

@@ -41,8 +41,8 @@ class SessionRecord(NamedTuple):
     """Subject of the token that opened the session; empty without one, and in records of earlier releases."""
 
     def pack(self) -> bytes:
-        """Return the fields as MessagePack."""
-        packed: bytes = msgpack.packb(tuple(self))
+        """Return the fields as MessagePack; without a subject, replicas of earlier releases can read them."""
+        packed: bytes = msgpack.packb(tuple(self) if self.subject else tuple(self)[:3])
         return packed
 
     @classmethod

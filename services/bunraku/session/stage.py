@@ -292,7 +292,7 @@ class Stage:
         return packed
 
     def _receive_viewer_count(self, message: bytes) -> None:
-        self.presence_publisher.report_viewers(*msgpack.unpackb(message))
+        self.presence_publisher.report_viewers(*msgpack.unpackb(message)[:2])
 
     async def _run_ticks(self) -> None:
         while True:

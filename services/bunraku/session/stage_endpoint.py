@@ -156,7 +156,7 @@ class StageEndpoint:
         return {"colour": puppeteer.colour}
 
     def _receive(self, message: bytes) -> None:
-        puppeteer_id, packed = msgpack.unpackb(message)
+        puppeteer_id, packed = msgpack.unpackb(message)[:2]
         puppeteer = self.stage.puppeteers.get(puppeteer_id)
         if puppeteer is None:
             if packed is not None:

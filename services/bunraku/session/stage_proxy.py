@@ -57,7 +57,8 @@ class StageProxy:
 
     async def join(self, puppeteer: Puppeteer, name: str) -> None:
         """Add a puppeteer. Subscribe to `outgoing_subject` first: messages follow at once."""
-        await self._request("join", [puppeteer.id, name, self._client_subject])
+        subject = () if self._client_subject is None else (self._client_subject,)
+        await self._request("join", [puppeteer.id, name, *subject])
 
     def outgoing_subject(self, puppeteer: Puppeteer) -> str:
         """Return the subject of the messages to a puppeteer."""

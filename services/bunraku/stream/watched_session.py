@@ -79,7 +79,7 @@ class WatchedSession:
         self._count_timer: asyncio.TimerHandle | None = None
         self._refresh_timer: asyncio.TimerHandle | None = None
         self._published_count = 0
-        timeline, presence, overlay = msgpack.unpackb(state)
+        timeline, presence, overlay = _unpack_state(state)
         self._overlay: bytes | None = None if overlay is None else encode_frame(overlay)
         self._presence = encode_frame(presence)
         self._timeline = _parse_timeline(timeline)
@@ -103,7 +103,7 @@ class WatchedSession:
 
         Raises `NoResponse` and `BackendUnavailable`.
         """
-        timeline, presence, overlay = msgpack.unpackb(await self._source.bus.request(f"{self._subject}.state"))
+        timeline, presence, overlay = _unpack_state(await self._source.bus.request(f"{self._subject}.state"))
         if _parse_timeline(timeline) != self._timeline:
             self._on_timeline(timeline)
         if encode_frame(presence) != self._presence:
@@ -354,6 +354,12 @@ class WatchedSessions:
         if session.is_empty and self._sessions.get(session.id) is session:
             session.close()
             del self._sessions[session.id]
+
+
+def _unpack_state(state: bytes) -> tuple[bytes, bytes, bytes | None]:
+    """Return timeline, presence and overlay; owners of later releases may send more."""
+    timeline, presence, overlay = msgpack.unpackb(state)[:3]
+    return timeline, presence, overlay
 
 
 def _parse_timeline(message: bytes) -> TimelineState:
