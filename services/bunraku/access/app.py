@@ -10,11 +10,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.access_token import MAX_SHARE_LIFETIME_S
+from bunraku.http.admission import network_of
 from bunraku.http.problem_details import install_problem_handlers, motion_not_found, session_not_found
 from bunraku.http.ticket_store import TICKET_LIFETIME_S, TooManyTickets
 from bunraku.http.timestamp import format_timestamp
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.runtime.client_network import client_network
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import Share
@@ -52,7 +52,7 @@ def create_app(context: ServiceContext) -> FastAPI:
     @requires(Role.VIEW, allow_bound=True, rate_limited=True)
     async def ticket(request: Request) -> JSONResponse:
         """Create a ticket for the query parameter `ticket` of a WebSocket URL. It is valid once, for 30 seconds."""
-        network = client_network(request.client.host) if request.client is not None else ""
+        network = network_of(request)
         try:
             issued = authenticator.tickets.issue(access_of(request), network)
         except TooManyTickets:

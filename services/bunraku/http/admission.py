@@ -15,8 +15,11 @@ from bunraku.runtime.problem import ProblemError
 
 def holder_of(connection: HTTPConnection) -> str:
     """Return who holds the slots of a request: the subject of its token, or else its address (IPv6: /64)."""
-    if subject := access_of(connection).subject:
-        return subject
+    return access_of(connection).subject or network_of(connection)
+
+
+def network_of(connection: HTTPConnection) -> str:
+    """Return the address of a request (IPv6: /64), empty if it is unknown."""
     return client_network(connection.client.host) if connection.client is not None else ""
 
 

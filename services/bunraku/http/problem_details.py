@@ -8,6 +8,7 @@ from http import HTTPStatus
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
+from pydantic import ValidationError
 from starlette.exceptions import HTTPException
 
 from bunraku.runtime import request_id
@@ -47,6 +48,12 @@ def invalid_field_problem(location: tuple[int | str, ...], message: str) -> Prob
     """
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in location).lstrip(".")
     return ProblemError(422, "Invalid request", f"{field}: {message}" if field else message, field=field or None)
+
+
+def validation_problem(error: ValidationError) -> ProblemError:
+    """Return the problem for the first error that pydantic has found in a request."""
+    first = error.errors(include_url=False)[0]
+    return invalid_field_problem(first["loc"], first["msg"])
 
 
 def problem_response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:

@@ -11,7 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from bunraku.http.large_body import BodySource, read_body
 from bunraku.http.openapi import JSON, request_body
-from bunraku.http.problem_details import invalid_field_problem
+from bunraku.http.problem_details import validation_problem
 from bunraku.http.structured_body import BodyStructure, decode_json, decode_msgpack
 from bunraku.marionette import arm_batch, bend_table, leg
 from bunraku.marionette.proportions import Proportions, ProportionsError
@@ -123,8 +123,7 @@ def decode_request(body: bytes, media_type: str) -> SolveRequest:
     try:
         return SolveRequest.model_validate(content)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise invalid_field_problem(first["loc"], first["msg"]) from error
+        raise validation_problem(error) from None
 
 
 def parse_proportions(identity: str) -> Proportions:

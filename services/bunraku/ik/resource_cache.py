@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from starlette.requests import Request
 
 from bunraku.http.access_control import Role, access_of
+from bunraku.http.admission import network_of
 from bunraku.http.token_bucket import KeyedTokenBuckets
-from bunraku.runtime.client_network import client_network
 from bunraku.runtime.problem import ProblemError
 
 MAX_CACHED_RESOURCES = 256
@@ -70,7 +70,7 @@ class ResourceCache:
 
     def _limit_builds(self, request: Request) -> None:
         access = access_of(request)
-        network = client_network(request.client.host) if request.client is not None else ""
+        network = network_of(request)
         if access.role < Role.ADMIN and not self._builds.take(f"{access.subject}\n{network}", self._clock()):
             raise ProblemError(
                 429,

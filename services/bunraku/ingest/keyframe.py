@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from bunraku.codec.scene import MAX_FIELD_OF_VIEW_RAD, MIN_FIELD_OF_VIEW_RAD
 from bunraku.http.large_body import BodySource, read_body
-from bunraku.http.problem_details import invalid_field_problem
+from bunraku.http.problem_details import validation_problem
 from bunraku.http.structured_body import BodyStructure, decode_json
 from bunraku.ingest.motion_id import derive_digest
 from bunraku.runtime.problem import ProblemError
@@ -85,8 +85,7 @@ def parse_staging(body: bytes) -> Staging:
         staging = Staging.model_validate(decode_json(body, BODY_STRUCTURE))
         check_keyframe_order(staging)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise invalid_field_problem(first["loc"], first["msg"]) from None
+        raise validation_problem(error) from None
     except KeyframeOrderError as error:
         raise ProblemError(422, "Out of order", str(error), field=error.field) from None
     if staging.camera is None and staging.lights is None:

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from bunraku.codec.container import StoredMotion
 from bunraku.http.admission import AdmissionLimit
-from bunraku.http.problem_details import invalid_field_problem
+from bunraku.http.problem_details import validation_problem
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.motion_id import derive_motion_id
@@ -133,8 +133,7 @@ def parse_recording_request(message: bytes) -> RecordingRequest:
     try:
         request = RecordingRequest.model_validate(msgpack.unpackb(message))
     except ValidationError as error:
-        first = error.errors()[0]
-        raise invalid_field_problem(first["loc"], first["msg"]) from None
+        raise validation_problem(error) from None
     except (ValueError, msgpack.UnpackException) as error:
         raise ProblemError(422, "Invalid request", f"not a recording request: {error}") from None
     if request.frame_count < 1:

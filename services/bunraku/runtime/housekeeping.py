@@ -14,6 +14,7 @@ from pathlib import Path
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
+from bunraku.runtime.settings import MEMORY_BUS
 from bunraku.runtime.temporary_folder import sweep_temporary_folders, try_lock
 from bunraku.storage.integrity import hide_incomplete_motions, sweep_objects
 
@@ -81,7 +82,7 @@ class Housekeeping:
         """Find out whether this process is the only one that uses a local library; hold its lock meanwhile."""
         library_url = self._context.settings.library_url()
         lock: int | None = None
-        if self._has_library and self._context.settings.bus == "memory:" and library_url.startswith("file://"):
+        if self._has_library and self._context.settings.bus == MEMORY_BUS and library_url.startswith("file://"):
             # a read-only folder, or Windows
             with contextlib.suppress(OSError, ImportError):
                 lock = await asyncio.to_thread(try_lock, Path(library_url.removeprefix("file://")) / OWNER_FILE)

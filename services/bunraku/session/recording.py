@@ -8,7 +8,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError
 
 from bunraku.http.large_body import BodySource, read_body
-from bunraku.http.problem_details import invalid_field_problem
+from bunraku.http.problem_details import validation_problem
 from bunraku.http.structured_body import BodyStructure, decode_json
 from bunraku.messaging.recording_request import MAX_CAMERA_KEYFRAMES, MAX_RECORDING_S, pack_camera
 
@@ -56,7 +56,6 @@ def parse_recording(body: BodySource) -> PackedRecording:
     try:
         recording = Recording.model_validate(decode_json(read_body(body), BODY_STRUCTURE))
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise invalid_field_problem(first["loc"], first["msg"]) from None
+        raise validation_problem(error) from None
     camera = pack_camera([[key.time, *key.position, *key.gaze, key.fov] for key in recording.camera])
     return PackedRecording(recording.name, recording.seconds, camera)

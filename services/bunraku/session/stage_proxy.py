@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 import msgpack
 
+from bunraku.http.problem_details import session_not_found
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.runtime.problem import ProblemError
@@ -69,7 +70,7 @@ class StageProxy:
         self._bus.publish(f"{self._subject}.said", msgpack.packb([puppeteer.id, message]))
 
     async def _request(self, operation: str, payload: Any, timeout_s: float = 2.0) -> Any:
-        not_found = ProblemError(404, "No such session", f"there is no session {self._session[:40]!r}")
+        not_found = session_not_found(self._session)
         if not is_subject_token(self._session):
             raise not_found
         try:
