@@ -38,10 +38,12 @@ from bunraku.websocket.subprotocol import CloseConnection
 
 SAFE_METHODS = ("GET", "HEAD", "OPTIONS")
 """HTTP methods that change nothing (RFC 9110, section 9.2.1)."""
+UNLIMITED_METHODS = (*SAFE_METHODS, "DELETE")
+"""Methods without a limit per subject: what is removed was created within limits, and links must be revocable."""
 CONNECT_BURST_S = 10
 """An address may open as many connections at once as the rate limit allows in this time, in seconds."""
 CHANGES_PER_S, CHANGE_BURST = 20.0, 200
-"""Rate of the requests of one subject that change something, at one process, and their number at once."""
+"""Rate of the requests of one subject that create or edit something, at one process, and their number at once."""
 _LINK_NEEDED = "A link is needed"
 
 _log = logging.getLogger(__name__)
@@ -161,7 +163,7 @@ class AuthorizationMiddleware:
             if requirement.rate_limited:
                 self._limit_connect_rate(scope)
             scope[ACCESS_SCOPE_KEY] = await self._authorize(scope, headers, requirement, path_params, None)
-            if scope["method"] not in SAFE_METHODS:
+            if scope["method"] not in UNLIMITED_METHODS:
                 self._limit_change_rate(scope[ACCESS_SCOPE_KEY], requirement)
         elif scope["path"].startswith(API_PREFIX):
             raise ProblemError(404, "Not Found", f"{scope['method']} {scope['path']}: Not Found")
@@ -242,7 +244,7 @@ class AuthorizationMiddleware:
             )
 
     def _limit_change_rate(self, access: Access, requirement: Requirement) -> None:
-        """Count a request that changes something. Raises `ProblemError` 429 above the limit of its subject.
+        """Count a request that creates or edits something. Raises `ProblemError` 429 above the limit of its subject.
 
         Requests of the role view change nothing that others share: they compute, or issue tickets.
         """
