@@ -4,7 +4,8 @@
  */
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
-import { createFigureFile, type FigureOptions, mixamoName } from "../avatar/figure-files";
+import { mixamoName } from "../avatar/figure-bones";
+import { createFigureFile, type FigureOptions } from "../avatar/figure-files";
 import { findViolations } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
 import {
