@@ -34,7 +34,7 @@ const MIXAMO_FIGURE: FigureOptions = {
   legLength: 0.85,
 };
 
-describeInBrowser("avatars", { demo: true }, ({ open }) => {
+describeInBrowser("avatars", { server: "open" }, ({ open }) => {
   test("a dropped avatar replaces the puppet and is not uploaded", async () => {
     const uploads: string[] = [];
     const before = async (page: Page) => {

@@ -1,6 +1,6 @@
 /** Chromium with software rendering, so that the tests run on machines without a graphics processor. */
 import { existsSync } from "node:fs";
-import { type Browser, chromium as playwright } from "playwright-core";
+import { type Browser, type BrowserServer, type LaunchOptions, chromium as playwright } from "playwright-core";
 
 /** Return the path of the installed Chromium (or `CHROMIUM`), or null if there is none. */
 export function chromiumPath(): string | null {
@@ -9,7 +9,21 @@ export function chromiumPath(): string | null {
 }
 
 export function launchChromium(executablePath: string, ...flags: string[]): Promise<Browser> {
-  return playwright.launch({
+  return playwright.launch(launchOptions(executablePath, flags));
+}
+
+/** Launch a browser that several processes can use at the same time (`connectToChromium`). */
+export function launchSharedChromium(executablePath: string, flags: readonly string[]): Promise<BrowserServer> {
+  // WebGL is drawn by SwiftShader, and the page around it by the processor itself: three times as many frames.
+  return playwright.launchServer(launchOptions(executablePath, ["--disable-gpu-compositing", ...flags]));
+}
+
+export function connectToChromium(endpoint: string): Promise<Browser> {
+  return playwright.connect(endpoint);
+}
+
+function launchOptions(executablePath: string, flags: readonly string[]): LaunchOptions {
+  return {
     executablePath,
     args: [
       "--no-sandbox",
@@ -27,5 +41,5 @@ export function launchChromium(executablePath: string, ...flags: string[]): Prom
       "--disable-background-timer-throttling",
       ...flags,
     ],
-  });
+  };
 }

@@ -21,7 +21,7 @@ import {
 /** With reduced motion, the session is paused when the page opens. */
 const REDUCED_MOTION: OpenOptions = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce" };
 
-describeInBrowser("limb control", { demo: true }, (fixture) => {
+describeInBrowser("limb control", { server: "open" }, (fixture) => {
   /** Open a page of a puppeteer with this name. Its stream connections are added to `sockets`. */
   async function open(name: string, sockets: WebSocketRoute[] = []): Promise<Page> {
     const before = (page: Page) =>
