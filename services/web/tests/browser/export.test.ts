@@ -8,6 +8,7 @@ import { JOINTS } from "../../src/motion/skeleton";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
 import {
+  clickInToast,
   jointPosition,
   LEFT_HAND,
   pauseAtStart,
@@ -229,8 +230,7 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
     expect(found.brightest[1]).toBeLessThan(100);
 
     // A recording can be downloaded from its toast.
-    await page.keyboard.press("KeyK");
-    await page.locator(".toast", { hasText: "Kept: posing" }).getByRole("button", { name: "Download" }).click();
+    await clickInToast(page, "Download", () => page.keyboard.press("KeyK"));
     await page.getByRole("group", { name: /^Download posing, as .+ pulled it as$/ }).waitFor();
     expect(await page.evaluate(() => document.activeElement?.getAttribute("aria-label"))).toBe(
       "BVH, motion for animation programs",

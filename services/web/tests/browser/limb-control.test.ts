@@ -3,6 +3,7 @@ import type { Page, WebSocketRoute } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import {
+  clickInToast,
   jointPosition,
   LEFT_HAND,
   pauseAtStart,
@@ -174,8 +175,7 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     expect([await controlSource(aiko), await controlSource(mateo)]).toEqual([null, "velocity"]);
     await request.waitFor({ state: "detached" });
     // One key records the performance, and the toast plays it.
-    await aiko.keyboard.press("KeyK");
-    await aiko.getByRole("button", { name: "Dance it" }).click();
+    await clickInToast(aiko, "Dance it", () => aiko.keyboard.press("KeyK"));
     await aiko.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
     await mateo.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
   });

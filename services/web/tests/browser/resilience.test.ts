@@ -20,8 +20,10 @@ import {
   waitUntilSettled,
 } from "./page-probe";
 
-/** Largest error of the motion's position, in seconds. */
+/** Largest error of the motion's position, in seconds, if the clock is exact. */
 const MAX_POSITION_ERROR_S = 0.1;
+/** Largest error of the clock with which the position is measured. A busy machine answers pings late. */
+const MAX_CLOCK_ERROR_S = 0.5;
 
 describeInBrowser("resilience", { server: "open" }, (fixture) => {
   test("offline, the motion plays on; after reconnecting it is in sync", async () => {
@@ -35,14 +37,15 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
     });
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    // Wait until the clock's error bound is small and its slew is complete: both limit the precision of the position.
-    await page.waitForFunction((maxError) => {
-      const { clock } = window.bunraku.viewer;
-      return (
-        Math.max(clock.errorBound, Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset)) <
-        0.2e6 * maxError
-      );
-    }, MAX_POSITION_ERROR_S);
+    // The clock's error bound and unfinished slew limit the precision of the position: both may shrink later.
+    const clockError = await page
+      .waitForFunction((maxError) => {
+        const { clock } = window.bunraku.viewer;
+        const slew = Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset);
+        const error = (clock.errorBound + slew) / 1e6;
+        return error < maxError && { error };
+      }, MAX_CLOCK_ERROR_S)
+      .then((handle) => handle.evaluate((found) => (found ? found.error : 0)));
     const start = await motionPosition(page);
     await page.context().setOffline(true);
     await waitForToast(page, "Connection lost, reconnecting", async () => {
@@ -75,7 +78,7 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
         const error = viewer.positionAt(now) - start.position - (now - start.now) / 1000;
         return Math.abs(error - viewer.duration * Math.round(error / viewer.duration)) < maxError;
       },
-      { start, maxError: MAX_POSITION_ERROR_S },
+      { start, maxError: MAX_POSITION_ERROR_S + clockError },
     );
     await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
