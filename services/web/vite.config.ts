@@ -44,6 +44,8 @@ export default defineConfig({
     hookTimeout: TEST_TIMEOUT_MS,
     expect: { poll: { timeout: TEST_TIMEOUT_MS } },
     environment: "node",
+    maxWorkers: 2,
+    reporters: ["default", "./tests/slowest-tests.ts"],
     projects: [
       {
         extends: true,
@@ -51,17 +53,17 @@ export default defineConfig({
           name: "node",
           include: ["tests/**/*.test.ts"],
           exclude: ["tests/browser/**"],
-          maxWorkers: 2,
+          // Files share their modules: most of them run for less time than their imports take to load.
+          isolate: false,
+          pool: "threads",
           sequence: { groupOrder: 0 },
         },
       },
-      // One file at a time: browsers that render in software compete for the processor.
       {
         extends: true,
         test: {
           name: "browser",
           include: ["tests/browser/*.test.ts"],
-          fileParallelism: false,
           globalSetup: "tests/browser/global-setup.ts",
           sequence: { groupOrder: 1 },
         },

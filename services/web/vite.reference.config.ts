@@ -1,16 +1,5 @@
-/** Build of the reference page of the HTTP API, into the folder of the page and after it. */
+/** Build of the reference page of the HTTP API, which the server answers at /v1/docs. */
 import { defineConfig } from "vite";
+import { additionalBuild } from "./vite.additional.ts";
 
-export default defineConfig({
-  // Relative URLs: the server answers at /v1/docs with the page, whose scripts are in /assets.
-  base: "./",
-  build: {
-    outDir: "../bunraku/page",
-    emptyOutDir: false,
-    copyPublicDir: false,
-    target: "es2023",
-    assetsInlineLimit: 0,
-    modulePreload: false,
-    rolldownOptions: { input: { reference: "v1/docs.html" } },
-  },
-});
+export default defineConfig(additionalBuild({ input: { reference: "v1/docs.html" } }));

@@ -8,10 +8,10 @@ import { initialOf } from "./format";
 import { icon } from "./icon";
 import type { Presence } from "./limb-state";
 
-/** Name of the other language in that language, and its short label on the button. */
+/** Name of the other language in that language, and the button's label. */
 const OTHER_LANGUAGE = {
-  en: { lang: "ja", name: "日本語", letter: "あ" },
-  ja: { lang: "en", name: "English", letter: "EN" },
+  en: { lang: "ja", name: "日本語", createLabel: () => icon("hiragana") },
+  ja: { lang: "en", name: "English", createLabel: () => "EN" },
 } as const;
 
 export interface Header {
@@ -70,7 +70,7 @@ export function createHeader(
       title: otherLanguage.name,
       onClick: actions.language,
     },
-    otherLanguage.letter,
+    otherLanguage.createLabel(),
   );
   const theme = element("button", { class: "round-button", type: "button", onClick: actions.theme }, icon("theme"));
   const right = element("div", { class: "header-right" }, people, share, keys, language, theme);

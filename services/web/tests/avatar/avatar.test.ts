@@ -6,7 +6,8 @@ import { type Figure, JOINTS, type Pose, restPose } from "../../src/motion/skele
 import { handlePosition } from "../../src/stage/puppet/performer";
 import { SOLE_HEIGHT_M, jointPosition as standing } from "../../src/stage/puppet/standard-figure";
 import { createOtherFigure, createStandardFigure } from "../stage/puppet/figures";
-import { createFigureFile, type FigureOptions, mixamoName } from "./figure-files";
+import { mixamoName } from "./figure-bones";
+import { createFigureFile, type FigureOptions } from "./figure-files";
 
 /** Bones of the limbs, and the joints of the figure at both ends. */
 const LIMBS: readonly (readonly [bone: string, next: string, joint: string, after: string])[] = [

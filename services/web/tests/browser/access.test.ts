@@ -1,31 +1,16 @@
 /** Share links on a server that requires tokens: viewers get no controls and are notified when the link is revoked. */
-import { beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { waitForFirstPose, waitForWelcome } from "./page-probe";
-import { makeToken } from "./server";
 
-const SECRET = "the secret of a server that a browser test started";
+interface Share {
+  id: string;
+  link: string;
+}
 
-describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture) => {
-  let admin: string;
-
-  beforeAll(() => void (admin = makeToken(SECRET, "admin")));
-
-  async function requestAsAdmin(method: string, address: string, body?: unknown): Promise<Response> {
-    const headers = { Authorization: `Bearer ${admin}`, "Content-Type": "application/json" };
-    return fetch(`${fixture.url}${address}`, { method, headers, ...(body ? { body: JSON.stringify(body) } : {}) });
-  }
-
-  async function shareSession(): Promise<{ id: string; link: string }> {
-    const { items } = (await (await requestAsAdmin("GET", "/v1/sessions")).json()) as { items: { id: string }[] };
-    return (await (await requestAsAdmin("POST", "/v1/shares", { session: items[0]?.id })).json()) as {
-      id: string;
-      link: string;
-    };
-  }
-
+describeInBrowser("access with links", { server: "guarded" }, (fixture) => {
   test("a viewer link shows no controls, and a notice once it is revoked", async () => {
-    const { id, link } = await shareSession();
+    const { id, link } = await fixture.request<Share>("POST", "/v1/shares", { session: fixture.session });
     const page = await fixture.open(link);
     await waitForFirstPose(page);
     expect(page.url()).not.toContain("#");
@@ -48,7 +33,7 @@ describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture)
     // The tab keeps the token.
     await page.reload();
     await waitForFirstPose(page);
-    expect((await requestAsAdmin("DELETE", `/v1/shares/${id}`)).status).toBe(204);
+    await fixture.request("DELETE", `/v1/shares/${id}`);
     const notice = page.locator(".notice");
     await notice.getByText("Link revoked").waitFor();
     expect(await notice.innerText()).toContain("ask for a new link");
@@ -75,10 +60,7 @@ describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture)
   });
 
   test("a link to a motion plays it on a private timeline", async () => {
-    const { items } = (await (await requestAsAdmin("GET", "/v1/motions")).json()) as { items: { id: string }[] };
-    const { link } = (await (await requestAsAdmin("POST", "/v1/shares", { motion: items[0]?.id })).json()) as {
-      link: string;
-    };
+    const { link } = await fixture.request<Share>("POST", "/v1/shares", { motion: fixture.motion });
     const page = await fixture.open(link);
     await waitForFirstPose(page);
     expect(page.url()).not.toContain("#");
@@ -90,7 +72,7 @@ describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture)
   });
 
   test("an admin link gives all controls and can create a viewer link", async () => {
-    const page = await fixture.open(`/#token=${admin}`);
+    const page = await fixture.open(`/#token=${fixture.tokens?.admin}`);
     await waitForFirstPose(page);
     expect(page.url()).not.toContain("token");
     await waitForWelcome(page);
@@ -102,8 +84,8 @@ describeInBrowser("access with links", { demo: true, secret: SECRET }, (fixture)
     const [viewerLink] = /http\S+/.exec(await page.locator(".toast").innerText()) ?? [
       await page.evaluate(() => navigator.clipboard.readText().catch(() => "")),
     ];
-    const shares = (await (await requestAsAdmin("GET", "/v1/shares")).json()) as { items: { by: string }[] };
-    expect(shares.items[0]?.by).toBe("operator");
+    const shares = await fixture.request<{ items: { by: string; session: string | null }[] }>("GET", "/v1/shares");
+    expect(shares.items.find(({ session }) => session === fixture.session)?.by).toBe("operator");
     if (viewerLink) {
       const viewer = await fixture.open(viewerLink);
       await waitForFirstPose(viewer);

@@ -41,37 +41,25 @@ const CLICK_COUNT = IS_BENCH ? 80 : 30;
 
 const FLAGS = ["--autoplay-policy=no-user-gesture-required"];
 
-describeInBrowser("sound", { browser: FLAGS, timeout: 3 * PAGE_TIMEOUT_MS }, (fixture) => {
+describeInBrowser("sound", { server: "open", browser: FLAGS, timeout: 3 * PAGE_TIMEOUT_MS }, (fixture) => {
   let silent: { id: string; duration: number };
   let motion: { id: string; duration: number };
 
   beforeAll(async () => {
-    silent = await requestJson("/v1/motions?filename=bows.bvh", {
-      method: "POST",
-      body: createBowingBvh(MOTION_DURATION_S * 30),
-    });
-    motion = await requestJson(`/v1/motions/${silent.id}/audio?filename=clicks.wav`, {
-      method: "POST",
-      body: createClicks(silent.duration),
-    });
+    silent = await fixture.request("POST", "/v1/motions?filename=bows.bvh", createBowingBvh(MOTION_DURATION_S * 30));
+    motion = await fixture.request(
+      "POST",
+      `/v1/motions/${silent.id}/audio?filename=clicks.wav`,
+      createClicks(silent.duration),
+    );
   }, PAGE_TIMEOUT_MS);
-
-  async function requestJson<T>(path: string, init: RequestInit = {}): Promise<T> {
-    const response = await fetch(fixture.url + path, init);
-    if (!response.ok) throw new Error(`${path}: ${response.status} ${await response.text()}`);
-    return (await response.json()) as T;
-  }
 
   /** Open a page with a new session that plays a motion. */
   async function open(
     id: string,
     { jitterMs = 0, hasDecoder = true, bypassPolicy = false }: Conditions = {},
   ): Promise<Page> {
-    const session = await requestJson<{ id: string }>("/v1/sessions", {
-      method: "POST",
-      headers: { "content-type": "application/json" },
-      body: JSON.stringify({ motion: id, loop: true, playing: true }),
-    });
+    const session = await fixture.request<{ id: string }>("POST", "/v1/sessions", { motion: id });
     const page = await fixture.open(`/?session=${session.id}`, {
       viewport: { width: 420, height: 320 },
       colorScheme: "dark",

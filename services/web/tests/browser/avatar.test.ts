@@ -4,7 +4,8 @@
  */
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
-import { createFigureFile, type FigureOptions, mixamoName } from "../avatar/figure-files";
+import { mixamoName } from "../avatar/figure-bones";
+import { createFigureFile, type FigureOptions } from "../avatar/figure-files";
 import { findViolations } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
 import {
@@ -33,7 +34,7 @@ const MIXAMO_FIGURE: FigureOptions = {
   legLength: 0.85,
 };
 
-describeInBrowser("avatars", { demo: true }, ({ open }) => {
+describeInBrowser("avatars", { server: "open" }, ({ open }) => {
   test("a dropped avatar replaces the puppet and is not uploaded", async () => {
     const uploads: string[] = [];
     const before = async (page: Page) => {

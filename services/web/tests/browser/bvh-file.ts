@@ -1,4 +1,7 @@
-/** Return a BVH file of a figure that bows: `count` frames at 30 fps, in centimetres and degrees. */
+/**
+ * Return a BVH file of a figure that bows: `count` frames at 30 fps, in centimetres and degrees. A server keeps equal
+ * files once, under the first name: each test has its own number of frames.
+ */
 export function createBowingBvh(count: number): string {
   const rotations = "CHANNELS 3 Zrotation Xrotation Yrotation";
   const bone = (name: string, offset: string, inside: string): string =>

@@ -1,31 +1,23 @@
 /** Language of embedded stages: each follows the nearest `lang` attribute. */
 import type { Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { countLoadedScripts, createEmbeddingPage, waitForStages } from "./embedding-page";
-import { startForeignSite } from "./foreign-site";
-import { makeToken } from "./server";
 
-const SECRET = "the secret of a server whose stages have two languages";
 const JAPANESE = /[\p{Script=Hiragana}\p{Script=Katakana}\p{Script=Han}]/u;
 /** Script with the Japanese translations. */
 const JAPANESE_SCRIPT = /^japanese-.*\.js$/;
 
-const site = await startForeignSite();
-afterAll(() => site.stop());
-
-describeInBrowser("language of embedded stages", { demo: true, secret: SECRET, origins: site.origin }, (fixture) => {
-  let token: string;
-
-  beforeAll(() => void (token = makeToken(SECRET, "control")));
-
+describeInBrowser("language of embedded stages", { server: "guarded" }, (fixture) => {
   async function open(stages: string, options: OpenOptions = {}): Promise<Page> {
-    site.html = createEmbeddingPage(stages, fixture.url);
-    return fixture.open(site.origin, options);
+    const path = await fixture.publish(createEmbeddingPage(stages, fixture.url));
+    return fixture.open(fixture.site.origin + path, options);
   }
 
-  function stage(attributes: string, address = `/#token=${token}`): string {
-    return `<bunraku-stage src="${fixture.url}${address}" controls style="width: 240px" ${attributes}></bunraku-stage>`;
+  /** Return the HTML of a stage with controls. */
+  function stage(attributes: string, session = fixture.session): string {
+    const address = `${fixture.url}/?session=${session}#token=${fixture.tokens?.control}`;
+    return `<bunraku-stage src="${address}" controls style="width: 240px" ${attributes}></bunraku-stage>`;
   }
 
   test("each stage follows the nearest lang attribute, also when it changes", async () => {
@@ -65,10 +57,9 @@ describeInBrowser("language of embedded stages", { demo: true, secret: SECRET, o
   });
 
   test("errors are shown in the language of the stage", async () => {
-    const missing = `/?session=nowhere#token=${token}`;
     const page = await open(
-      stage('id="first" lang="ja"', missing) +
-        stage('id="second"', missing) +
+      stage('id="first" lang="ja"', "nowhere") +
+        stage('id="second"', "nowhere") +
         '<bunraku-stage lang="ja" src="stage:here" style="width: 240px"></bunraku-stage>',
     );
     await page.locator("#first .notice").getByText("舞台'nowhere'はありません").waitFor();

@@ -1,11 +1,9 @@
 /** Sound of an embedded stage: muted until the viewer or the page turns it on. */
 import type { Page } from "playwright-core";
-import { afterAll, beforeAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { countLoadedScripts, createEmbeddingPage, waitForStages } from "./embedding-page";
-import { startForeignSite } from "./foreign-site";
 import { tapKey } from "./page-probe";
-import { makeToken } from "./server";
 
 declare global {
   interface Window {
@@ -16,27 +14,20 @@ declare global {
   }
 }
 
-const SECRET = "the secret of a server whose stages are heard in other pages";
 /** Samples above this magnitude (0 to 1) are not silence. */
 const SILENCE_THRESHOLD = 0.005;
 /** Scripts that decode and play audio. */
 const AUDIO_SCRIPTS = /^(sound|webcodecs|wasm)\b.*\.js$/;
 
-const site = await startForeignSite();
-afterAll(() => site.stop());
-
-describeInBrowser("sound of an embedded stage", { demo: true, secret: SECRET, origins: site.origin }, (fixture) => {
-  let token: string;
-
-  beforeAll(() => void (token = makeToken(SECRET, "control")));
-
+describeInBrowser("sound of an embedded stage", { server: "guarded" }, (fixture) => {
   async function open(attributes: string, options: OpenOptions = {}): Promise<Page> {
-    site.html = createEmbeddingPage(
-      `<bunraku-stage src="${fixture.url}/#token=${token}" style="width: 300px" ${attributes}></bunraku-stage>` +
-        "<button>Listen</button>",
-      fixture.url,
-    );
-    const page = await fixture.open(site.origin, { ...options, before: (page) => page.addInitScript(recordOutputs) });
+    const address = `${fixture.url}/?session=${fixture.session}#token=${fixture.tokens?.control}`;
+    const stage = `<bunraku-stage src="${address}" style="width: 300px" ${attributes}></bunraku-stage>`;
+    const path = await fixture.publish(createEmbeddingPage(`${stage}<button>Listen</button>`, fixture.url));
+    const page = await fixture.open(fixture.site.origin + path, {
+      ...options,
+      before: (page) => page.addInitScript(recordOutputs),
+    });
     await waitForStages(page);
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.viewer?.audio);
     return page;
@@ -87,7 +78,7 @@ describeInBrowser("sound of an embedded stage", { demo: true, secret: SECRET, or
     // Another motion uses the same audio context, which closes when the element is removed.
     await page.evaluate(() => {
       const stage = document.querySelector("bunraku-stage")!;
-      stage.src = stage.src.replace("/#", `/v1/motions/${stage.viewer!.motion}#`);
+      stage.src = stage.src.replace(/\/\?.*#/, `/v1/motions/${stage.viewer!.motion}#`);
     });
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.viewer?.audio);
     await waitForSound(page, true);

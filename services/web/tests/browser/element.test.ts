@@ -4,42 +4,27 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import type { Page, WebSocket } from "playwright-core";
-import { afterAll, beforeAll, expect, onTestFinished, test } from "vitest";
+import { beforeEach, expect, onTestFinished, test } from "vitest";
 import type { BunrakuStage } from "../../src/element/stage-element";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { createEmbeddingPage, waitForStages } from "./embedding-page";
-import { startForeignSite } from "./foreign-site";
 import { LEFT_HAND, tapKey, waitUntilSettled } from "./page-probe";
-import { makeToken } from "./server";
 
-const SECRET = "the secret of a server whose stage is embedded in other pages";
-
-const site = await startForeignSite();
-afterAll(() => site.stop());
-
-describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${site.origin},null` }, (fixture) => {
+describeInBrowser("embedded stage", { server: "guarded" }, (fixture) => {
+  /** Token of role control. */
   let token: string;
   let session: string;
-  let motion: string;
+  /** Address of the test's session. */
+  let address: string;
 
-  beforeAll(async () => {
-    token = makeToken(SECRET, "control");
-    [session, motion] = await Promise.all(
-      ["sessions", "motions"].map(async (kind) => (await request("GET", `/v1/${kind}`)).items[0].id),
-    );
+  beforeEach(() => {
+    [token, session] = [fixture.tokens?.control ?? "", fixture.session ?? ""];
+    address = `${fixture.url}/?session=${session}#token=${token}`;
   });
 
-  async function request(method: string, path: string, body?: unknown) {
-    const headers = { Authorization: `Bearer ${token}`, "Content-Type": "application/json" };
-    return (await (
-      await fetch(fixture.url + path, { method, headers, ...(body ? { body: JSON.stringify(body) } : {}) })
-    ).json()) as { items: { id: string }[]; link: string };
-  }
-
-  /** Open the site's page with `stages` in it. */
-  async function open(stages: string, address = site.origin, options: OpenOptions = {}): Promise<Page> {
-    site.html = createEmbeddingPage(stages, fixture.url);
-    return fixture.open(address, options);
+  /** Open a page of the foreign site with `stages` in it. */
+  async function open(stages: string, options: OpenOptions = {}, origin = fixture.site.origin): Promise<Page> {
+    return fixture.open(origin + (await fixture.publish(createEmbeddingPage(stages, fixture.url))), options);
   }
 
   test("one script tag embeds a stage controlled by pointer and keys", async () => {
@@ -52,7 +37,7 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
     // At position 0 the hands hang down and can be moved upwards.
-    await request("PATCH", `/v1/sessions/${session}`, { playing: false, position: 0 });
+    await fixture.request("PATCH", `/v1/sessions/${session}`, { playing: false, position: 0 });
     await page.waitForFunction(() => {
       const viewer = document.querySelector("bunraku-stage")!.viewer!;
       const timeline = viewer.timelineHistory.at(viewer.presentationTime(performance.now()));
@@ -93,10 +78,9 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
   test("attributes apply live; moving keeps and removing closes connections", async () => {
     const sockets: WebSocket[] = [];
     const before = async (page: Page) => void page.on("websocket", (socket) => sockets.push(socket));
-    const { link } = await request("POST", "/v1/shares", { session });
+    const { link } = await fixture.request<{ link: string }>("POST", "/v1/shares", { session });
     const page = await open(
       `<bunraku-stage src="${fixture.url}${link}" theme="night" style="width: 300px"></bunraku-stage><p></p>`,
-      site.origin,
       { before },
     );
     await waitForStages(page);
@@ -117,10 +101,7 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
     await expect
       .poll(() => page.getByRole("button").evaluateAll((all) => all.map((button) => button.getAttribute("title"))))
       .toEqual(["Sound on"]);
-    await page.evaluate(
-      (src) => (document.querySelector("bunraku-stage")!.src = src),
-      `${fixture.url}/?session=${session}#token=${token}`,
-    );
+    await page.evaluate((src) => (document.querySelector("bunraku-stage")!.src = src), address);
     await page.getByRole("button", { name: "Take the left hand" }).waitFor();
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
     await expect.poll(() => openSockets().sort()).toEqual(["control", "stream"]);
@@ -135,7 +116,7 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
     });
     await page.evaluate(
       (src) => (document.querySelector("bunraku-stage")!.src = src),
-      `${fixture.url}/v1/motions/${motion}#token=${token}`,
+      `${fixture.url}/v1/motions/${fixture.motion}#token=${token}`,
     );
     await waitForStages(page);
     await page.getByRole("button", { name: "Take the left hand" }).waitFor({ state: "hidden" });
@@ -155,7 +136,9 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
       );
     });
 
-    expect(await page.evaluate(() => (window as unknown as { readyMotions: string[] }).readyMotions)).toEqual([motion]);
+    expect(await page.evaluate(() => (window as unknown as { readyMotions: string[] }).readyMotions)).toEqual([
+      fixture.motion,
+    ]);
 
     const isKept = await page.evaluate(() => {
       const stage = document.querySelector("bunraku-stage")!;
@@ -195,12 +178,11 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
     const folder = mkdtempSync(join(tmpdir(), "bunraku-file-"));
     onTestFinished(() => rmSync(folder, { recursive: true }));
     const file = join(folder, "page.html");
-    const src = `${fixture.url}/#token=${token}`;
     writeFileSync(
       file,
       createEmbeddingPage(
         ["", 'theme="day"']
-          .map((theme) => `<bunraku-stage src="${src}" ${theme} style="width: 200px"></bunraku-stage>`)
+          .map((theme) => `<bunraku-stage src="${address}" ${theme} style="width: 200px"></bunraku-stage>`)
           .join(""),
         fixture.url,
       ),
@@ -247,11 +229,8 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
   test("a notice explains why a stage cannot be shown", async () => {
     const notice = (page: Page, nth = 0) => page.locator("bunraku-stage .notice:not([hidden])").nth(nth);
     // An origin that the server does not allow.
-    const disallowed = await open(
-      `<bunraku-stage src="${fixture.url}/?session=${session}#token=${token}"></bunraku-stage>`,
-      site.alias,
-    );
-    await notice(disallowed).getByText(`BUNRAKU_ORIGINS=${site.alias}`).waitFor();
+    const disallowed = await open(`<bunraku-stage src="${address}"></bunraku-stage>`, {}, fixture.site.alias);
+    await notice(disallowed).getByText(`BUNRAKU_ORIGINS=${fixture.site.alias}`).waitFor();
     expect(await disallowed.evaluate(() => document.querySelector("bunraku-stage")?.viewer)).toBeNull();
 
     const unreachable = new URL(fixture.url);
@@ -269,10 +248,7 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
       });
     const page = await open(
       [stageElement(fixture.url), stageElement("stage:here"), stageElement(unreachable.origin)].join(""),
-      site.origin,
-      {
-        before: recordErrors,
-      },
+      { before: recordErrors },
     );
     await notice(page, 0).getByText("A link is needed").waitFor();
     await notice(page, 1).getByText("No stage here").waitFor();
@@ -280,7 +256,7 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
     expect(await page.evaluate(() => (window as unknown as { errors: string[] }).errors.length)).toBe(3);
 
     // The server is unavailable at first and recovers.
-    const recovering = await open(stageElement(`${fixture.url}/#token=${token}`), site.origin, {
+    const recovering = await open(stageElement(`${fixture.url}/#token=${token}`), {
       before: (page) => page.route("**/v1/sessions", (route) => route.abort()),
     });
     await notice(recovering).getByText("Retrying automatically").waitFor();
@@ -288,7 +264,7 @@ describeInBrowser("embedded stage", { demo: true, secret: SECRET, origins: `${si
     await waitForStages(recovering);
     await notice(recovering).waitFor({ state: "hidden" });
 
-    const withoutWebGl = await open(stageElement(`${fixture.url}/#token=${token}`), site.origin, {
+    const withoutWebGl = await open(stageElement(address), {
       before: (page) => page.addInitScript(() => (HTMLCanvasElement.prototype.getContext = () => null)),
     });
     await notice(withoutWebGl).getByText("This browser cannot draw the stage").waitFor();

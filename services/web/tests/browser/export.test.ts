@@ -1,5 +1,5 @@
 /** Downloads of motions and pictures of the stage. */
-import { readFile } from "node:fs/promises";
+import { buffer } from "node:stream/consumers";
 import type { Page } from "playwright-core";
 import { type AnimationClip, AnimationMixer, type Bone, Vector3 } from "three";
 import { BVHLoader } from "three/examples/jsm/loaders/BVHLoader.js";
@@ -8,6 +8,7 @@ import { JOINTS } from "../../src/motion/skeleton";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
 import {
+  clickInToast,
   jointPosition,
   LEFT_HAND,
   pauseAtStart,
@@ -29,7 +30,7 @@ interface DownloadedFile {
 /** Run `action` and return the file that the page downloads. */
 async function captureDownload(page: Page, action: () => Promise<unknown>): Promise<DownloadedFile> {
   const [download] = await Promise.all([page.waitForEvent("download"), action()]);
-  return { name: download.suggestedFilename(), bytes: await readFile(await download.path()) };
+  return { name: download.suggestedFilename(), bytes: await buffer(await download.createReadStream()) };
 }
 
 /** Upload a file and wait for its first pose. */
@@ -81,9 +82,17 @@ function parseGlbJson({ bytes }: DownloadedFile): Record<string, unknown> {
   return JSON.parse(bytes.subarray(20, 20 + bytes.readUInt32LE(12)).toString()) as Record<string, unknown>;
 }
 
-describeInBrowser("exports", {}, ({ open }) => {
+describeInBrowser("exports", { server: "open" }, (fixture) => {
+  /** Open a page with an open library. */
+  async function open(): Promise<Page> {
+    const page = await fixture.open("", CALM);
+    await waitForFirstPose(page);
+    await page.getByRole("button", { name: "Library", exact: true }).click();
+    return page;
+  }
+
   test("BVH, GLB and VRMA downloads match the stated codec error", async () => {
-    const page = await open("", CALM);
+    const page = await open();
     await uploadMotion(page, "bowing", createBowingBvh(60));
     const first = await downloadMotion(page, "bowing", "BVH");
     expect(first.name).toBe("bowing.bvh");
@@ -125,7 +134,7 @@ describeInBrowser("exports", {}, ({ open }) => {
   });
 
   test("a GLB has all performers; BVH and VRMA have one, as placed", async () => {
-    const page = await open("", CALM);
+    const page = await open();
     await uploadMotion(page, "pair", createBowingBvh(45));
     const alone = jointPositionsIn(await downloadMotion(page, "pair", "BVH"));
     await page.getByRole("button", { name: "Add pair to the stage" }).click();
@@ -172,7 +181,7 @@ describeInBrowser("exports", {}, ({ open }) => {
   });
 
   test("a cancelled download saves nothing; a failed one shows the problem", async () => {
-    const page = await open("", CALM);
+    const page = await open();
     await uploadMotion(page, "stopped", createBowingBvh(90));
     await page.route("**/description", () => undefined);
     const disclosure = page.getByRole("button", { name: "Download stopped", exact: true });
@@ -188,7 +197,7 @@ describeInBrowser("exports", {}, ({ open }) => {
   });
 
   test("a picture shows the controlled pose and does not change the stage", async () => {
-    const page = await open("", CALM);
+    const page = await open();
     await uploadMotion(page, "posing", createBowingBvh(75));
     await pauseAtStart(page);
     await page.keyboard.press("Escape");
@@ -221,8 +230,7 @@ describeInBrowser("exports", {}, ({ open }) => {
     expect(found.brightest[1]).toBeLessThan(100);
 
     // A recording can be downloaded from its toast.
-    await page.keyboard.press("KeyK");
-    await page.locator(".toast", { hasText: "Kept: posing" }).getByRole("button", { name: "Download" }).click();
+    await clickInToast(page, "Download", () => page.keyboard.press("KeyK"));
     await page.getByRole("group", { name: /^Download posing, as .+ pulled it as$/ }).waitFor();
     expect(await page.evaluate(() => document.activeElement?.getAttribute("aria-label"))).toBe(
       "BVH, motion for animation programs",

@@ -3,12 +3,12 @@ import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
 
-/** A motion of two seconds. */
-const MOTION = createBowingBvh(60);
+const MOTION = createBowingBvh(50);
 
-describeInBrowser("file drop", {}, ({ open }) => {
+describeInBrowser("file drop", { server: "open" }, ({ open }) => {
   test("a file dropped on the page is uploaded and played", async () => {
     const page = await open("", { viewport: { width: 500, height: 400 }, reducedMotion: "reduce" });
+    await page.getByRole("button", { name: "Library", exact: true }).click();
     await page.getByRole("complementary", { name: "Library" }).waitFor();
     await page.evaluate(dispatchDrag, { type: "dragover", name: "dropped.bvh", text: MOTION });
     await page.locator(".drop-frame").waitFor();

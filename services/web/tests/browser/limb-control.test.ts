@@ -3,6 +3,7 @@ import type { Page, WebSocketRoute } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import {
+  clickInToast,
   jointPosition,
   LEFT_HAND,
   pauseAtStart,
@@ -21,7 +22,7 @@ import {
 /** With reduced motion, the session is paused when the page opens. */
 const REDUCED_MOTION: OpenOptions = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce" };
 
-describeInBrowser("limb control", { demo: true }, (fixture) => {
+describeInBrowser("limb control", { server: "open" }, (fixture) => {
   /** Open a page of a puppeteer with this name. Its stream connections are added to `sockets`. */
   async function open(name: string, sockets: WebSocketRoute[] = []): Promise<Page> {
     const before = (page: Page) =>
@@ -174,8 +175,7 @@ describeInBrowser("limb control", { demo: true }, (fixture) => {
     expect([await controlSource(aiko), await controlSource(mateo)]).toEqual([null, "velocity"]);
     await request.waitFor({ state: "detached" });
     // One key records the performance, and the toast plays it.
-    await aiko.keyboard.press("KeyK");
-    await aiko.getByRole("button", { name: "Dance it" }).click();
+    await clickInToast(aiko, "Dance it", () => aiko.keyboard.press("KeyK"));
     await aiko.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
     await mateo.locator(".brand-piece", { hasText: "as Aiko pulled it" }).waitFor();
   });

@@ -15,16 +15,16 @@ declare global {
   }
 }
 
-describeInBrowser("memory", { demo: true }, (fixture) => {
+describeInBrowser("memory", { server: "open" }, (fixture) => {
   test("replaced performers are freed from the heap and the graphics memory", async () => {
     const page = await fixture.open("", { viewport: { width: 260, height: 220 } });
     const protocol = await page.context().newCDPSession(page);
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    const [demo, uploaded] = ["Sanba", "bows"];
+    const [demo, uploaded] = ["Sanba", "memorable bows"];
     await page
       .locator('input[type=file][accept*=".bvh"]')
-      .setInputFiles({ name: "bows.bvh", mimeType: "text/plain", buffer: Buffer.from(createBowingBvh(60)) });
+      .setInputFiles({ name: `${uploaded}.bvh`, mimeType: "text/plain", buffer: Buffer.from(createBowingBvh(64)) });
     await page.locator(".brand-piece", { hasText: uploaded }).waitFor({ state: "attached" });
     await waitForFirstPose(page);
     await playMotion(page, demo);

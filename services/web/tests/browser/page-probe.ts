@@ -54,10 +54,27 @@ export async function tapKey(page: Page, key: string): Promise<void> {
   await Promise.all([page.keyboard.down(key), page.keyboard.up(key)]);
 }
 
-/** Run `action` and wait for a toast with `text`. The wait starts before the action, because toasts are brief. */
+/**
+ * Run `action` and wait for a toast with `text`. Toasts are brief: the page looks for it at every frame, from before the
+ * action.
+ */
 export async function waitForToast<T>(page: Page, text: string, action: () => Promise<T>): Promise<T> {
-  const [result] = await Promise.all([action(), page.locator(".toast", { hasText: text }).waitFor()]);
-  return result;
+  const shown = page.waitForFunction(
+    (text) => [...document.querySelectorAll(".toast")].some(({ textContent }) => textContent.includes(text)),
+    text,
+  );
+  return (await Promise.all([action(), shown]))[0];
+}
+
+/** Run `action` and click the button with `label` in the toast that follows, as soon as it is shown. */
+export async function clickInToast(page: Page, label: string, action: () => Promise<unknown>): Promise<void> {
+  const clicked = page.waitForFunction((label) => {
+    const buttons = [...document.querySelectorAll<HTMLElement>(".toast-action")];
+    const button = buttons.find(({ textContent }) => textContent.startsWith(label));
+    button?.click();
+    return button !== undefined;
+  }, label);
+  await Promise.all([action(), clicked]);
 }
 
 /**

@@ -1,7 +1,7 @@
 /** The page: upload, playback, control of a hand that a second page shows, and the keyboard. */
 import { join } from "node:path";
 import type { Page } from "playwright-core";
-import { expect, onTestFinished, test } from "vitest";
+import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import {
   jointPosition,
@@ -14,7 +14,7 @@ import {
   waitForHold,
   waitUntilSettled,
 } from "./page-probe";
-import { sharedClipFolder, startServer } from "./server";
+import { sharedClipFolder } from "./server";
 
 const DARK: OpenOptions = { colorScheme: "dark" };
 
@@ -23,7 +23,7 @@ if (!shared && process.env["CI"])
   throw new Error("No recorded clips found. Their browser test must run in CI: set BUNRAKU_SHARED.");
 if (!shared) console.warn("browser test of a recorded clip skipped: no clips found (set BUNRAKU_SHARED)");
 
-describeInBrowser("the page", {}, ({ open }) => {
+describeInBrowser("page of an empty server", { server: "empty" }, ({ open }) => {
   test("an empty stage opens the library, and a wrong file shows the problem", async () => {
     const page = await open("", DARK);
     await page.getByRole("complementary", { name: "Library" }).waitFor();
@@ -79,11 +79,11 @@ describeInBrowser("the page", {}, ({ open }) => {
     await second.getByRole("button", { name: "Take the left hand" }).waitFor();
     await waitForDistance(second, "l_wrist", motionPosition, 0, 0.02);
   });
+});
 
+describeInBrowser("page", { server: "open" }, ({ open }) => {
   test("all functions work by keyboard alone", async () => {
-    const server = await startServer({ demo: true });
-    onTestFinished(() => server.stop());
-    const page = await open(server.url, DARK);
+    const page = await open("", DARK);
     await waitForFirstPose(page);
     await page.keyboard.press("Space");
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();

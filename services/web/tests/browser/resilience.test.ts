@@ -20,18 +20,12 @@ import {
   waitUntilSettled,
 } from "./page-probe";
 
-/** Largest error of the motion's position, in seconds. */
+/** Largest error of the motion's position, in seconds, if the clock is exact. */
 const MAX_POSITION_ERROR_S = 0.1;
+/** Largest error of the clock with which the position is measured. A busy machine answers pings late. */
+const MAX_CLOCK_ERROR_S = 0.5;
 
-describeInBrowser("resilience", { demo: true }, (fixture) => {
-  /** Return the server's first session. */
-  async function firstSession(): Promise<{ id: string; viewers: number }> {
-    const { items } = (await (await fetch(`${fixture.url}/v1/sessions`)).json()) as {
-      items: { id: string; viewers: number }[];
-    };
-    return items[0];
-  }
-
+describeInBrowser("resilience", { server: "open" }, (fixture) => {
   test("offline, the motion plays on; after reconnecting it is in sync", async () => {
     const sockets: WebSocketRoute[] = [];
     const page = await fixture.open("", {
@@ -43,14 +37,15 @@ describeInBrowser("resilience", { demo: true }, (fixture) => {
     });
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    // Wait until the clock's error bound is small and its slew is complete: both limit the precision of the position.
-    await page.waitForFunction((maxError) => {
-      const { clock } = window.bunraku.viewer;
-      return (
-        Math.max(clock.errorBound, Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset)) <
-        0.2e6 * maxError
-      );
-    }, MAX_POSITION_ERROR_S);
+    // The clock's error bound and unfinished slew limit the precision of the position: both may shrink later.
+    const clockError = await page
+      .waitForFunction((maxError) => {
+        const { clock } = window.bunraku.viewer;
+        const slew = Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset);
+        const error = (clock.errorBound + slew) / 1e6;
+        return error < maxError && { error };
+      }, MAX_CLOCK_ERROR_S)
+      .then((handle) => handle.evaluate((found) => (found ? found.error : 0)));
     const start = await motionPosition(page);
     await page.context().setOffline(true);
     await waitForToast(page, "Connection lost, reconnecting", async () => {
@@ -83,7 +78,7 @@ describeInBrowser("resilience", { demo: true }, (fixture) => {
         const error = viewer.positionAt(now) - start.position - (now - start.now) / 1000;
         return Math.abs(error - viewer.duration * Math.round(error / viewer.duration)) < maxError;
       },
-      { start, maxError: MAX_POSITION_ERROR_S },
+      { start, maxError: MAX_POSITION_ERROR_S + clockError },
     );
     await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
@@ -158,16 +153,18 @@ describeInBrowser("resilience", { demo: true }, (fixture) => {
   });
 
   test("with reduced motion the session starts paused without transitions", async () => {
-    // Only the first viewer pauses the session: wait until the other tests' viewers have left.
-    await expect.poll(async () => (await firstSession()).viewers).toBe(0);
-    const edit = {
-      method: "PATCH",
-      headers: { "Content-Type": "application/json" },
-      body: JSON.stringify({ playing: true }),
-    };
-    expect((await fetch(`${fixture.url}/v1/sessions/${(await firstSession()).id}`, edit)).status).toBe(200);
-    const page = await fixture.open("", { reducedMotion: "reduce" });
+    // A page whose address names no session enters one that runs: here, as if there were no other tests.
+    const page = await fixture.open("?session=", {
+      reducedMotion: "reduce",
+      before: (page) =>
+        page.route("**/v1/sessions", async (route) => {
+          const response = await route.fetch({ url: `${route.request().url()}?limit=200` });
+          const { items } = (await response.json()) as { items: { id: string }[] };
+          await route.fulfill({ response, json: { items: items.filter(({ id }) => id === fixture.session) } });
+        }),
+    });
     await waitForFirstPose(page);
+    expect(new URL(page.url()).searchParams.get("session")).toBe(fixture.session);
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await page.keyboard.press("KeyS");
     await page.getByRole("complementary", { name: "Strings" }).waitFor();

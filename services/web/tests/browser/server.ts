@@ -1,6 +1,6 @@
-/** Servers for browser tests: `bunraku up` on a free port with a temporary data folder. */
+/** Servers for browser tests: `bunraku up` on a free port. */
 import { spawn, spawnSync } from "node:child_process";
-import { cpSync, existsSync, mkdtempSync, rmSync } from "node:fs";
+import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 
@@ -20,33 +20,23 @@ export interface RunningServer {
   stop(): Promise<void>;
 }
 
-/** Start a server and resolve once it accepts requests. */
+/** Start a server with a temporary data folder and resolve once it accepts requests. */
 export async function startServer(options: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
-  const folder = process.env["BUNRAKU_DEMO_DATA"];
-  if (options.demo && folder) cpSync(await createDemoData(folder), data, { recursive: true });
-  return runServer(data, options, () => rmSync(data, { recursive: true, force: true }));
+  const server = await runServer(data, options);
+  return {
+    url: server.url,
+    async stop() {
+      await server.stop();
+      rmSync(data, { recursive: true, force: true });
+    },
+  };
 }
 
-/**
- * Return a data folder that contains the encoded demo, within `folder`. All test files of a run share it, because
- * encoding the demo takes as long as seven server starts.
- */
-async function createDemoData(folder: string): Promise<string> {
-  const demoData = join(folder, "made");
-  if (!existsSync(demoData)) {
-    const data = mkdtempSync(join(folder, "making-"));
-    await (await runServer(data, { demo: true })).stop();
-    cpSync(data, demoData, { recursive: true });
-  }
-  return demoData;
-}
-
-/** Run a server that stores its data in `data`, and call `onStopped` once it has exited. */
-async function runServer(
+/** Run a server that stores its data in `data`. */
+export async function runServer(
   data: string,
   { demo = false, secret = "", origins = "" }: ServerOptions,
-  onStopped: () => void = () => undefined,
 ): Promise<RunningServer> {
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
@@ -68,7 +58,6 @@ async function runServer(
     async stop() {
       server.kill("SIGINT");
       await exited;
-      onStopped();
     },
   };
 }

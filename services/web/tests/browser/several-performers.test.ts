@@ -1,9 +1,8 @@
 /** Several performers on one stage: added from the library and controlled separately, also in an embedded stage. */
 import type { Page } from "playwright-core";
-import { afterAll, expect, test } from "vitest";
+import { expect, test } from "vitest";
 import { findViolations } from "./accessibility";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
-import { startForeignSite } from "./foreign-site";
 import {
   LEFT_HAND,
   pauseAtStart,
@@ -25,12 +24,9 @@ const REDUCED_MOTION: OpenOptions = { viewport: { width: 900, height: 560 }, red
 /** Index of the first limb of the second performer. */
 const SECOND_PERFORMER = 4;
 
-const site = await startForeignSite();
-afterAll(() => site.stop());
-
-describeInBrowser("several performers", { demo: true, origins: site.origin }, (fixture) => {
-  async function open(name: string, address = ""): Promise<Page> {
-    const page = await fixture.open(`${address}?name=${name}`, REDUCED_MOTION);
+describeInBrowser("several performers", { server: "open" }, (fixture) => {
+  async function open(name: string): Promise<Page> {
+    const page = await fixture.open(`?name=${name}`, REDUCED_MOTION);
     await waitForFirstPose(page);
     await waitForWelcome(page);
     return page;
@@ -54,7 +50,7 @@ describeInBrowser("several performers", { demo: true, origins: site.origin }, (f
     expect(await page.evaluate(() => window.bunraku.stage.renderer.info.memory.geometries)).toBeLessThan(12);
     expect(await page.evaluate(() => window.bunraku.stage.audience.camera.position.toArray())).not.toEqual(soloCamera);
 
-    const mateo = await open("Mateo", new URL(page.url()).pathname);
+    const mateo = await open("Mateo");
     await waitForPerformers(mateo, 2);
     for (const viewer of [page, mateo]) {
       await pauseAtStart(viewer);
@@ -100,21 +96,20 @@ describeInBrowser("several performers", { demo: true, origins: site.origin }, (f
   test("a stage has at most four performers, also when embedded", async () => {
     const page = await open("Aiko");
     await page.getByRole("button", { name: "Library", exact: true }).click();
-    // The first test made a motion of two performers.
+    await addToStage(page, "Sanbasō, First Steps");
     await waitForPerformers(page, 2);
     await addToStage(page, "Sanbasō, First Steps × 2");
     await waitForPerformers(page, 4);
     await addToStage(page, "Sanbasō, First Steps");
     await page.getByText("The stage is full").waitFor();
 
-    const session = new URL(page.url()).searchParams.get("session") ?? "";
-    site.html = [
+    const html = [
       "<!doctype html><title>Elsewhere</title>",
       `<script type="module" src="${fixture.url}/embed/bunraku-stage.js"></script>`,
-      `<bunraku-stage src="${fixture.url}/?session=${session}&name=Mateo" controls`,
+      `<bunraku-stage src="${fixture.url}/?session=${fixture.session}&name=Mateo" controls`,
       ' style="width: 420px"></bunraku-stage>',
     ].join("");
-    const embedding = await fixture.open(site.origin, REDUCED_MOTION);
+    const embedding = await fixture.open(fixture.site.origin + (await fixture.publish(html)), REDUCED_MOTION);
     await embedding.waitForFunction(
       () =>
         document.querySelector("bunraku-stage")?.stage?.performers.filter(({ group }) => group.visible).length === 4,
@@ -126,9 +121,12 @@ describeInBrowser("several performers", { demo: true, origins: site.origin }, (f
   });
 });
 
-/** Add the motion of this name to the stage. */
+/** Add the motion of this name to the stage. The library may have several of them, from other tests. */
 async function addToStage(page: Page, name: string): Promise<void> {
-  await page.getByRole("button", { name: `Add ${name} to the stage`, exact: true }).click();
+  await page
+    .getByRole("button", { name: `Add ${name} to the stage`, exact: true })
+    .first()
+    .click();
 }
 
 /** Return the horizontal range of the heads in normalised device coordinates (-1 to 1). */

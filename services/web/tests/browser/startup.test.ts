@@ -4,7 +4,7 @@ import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { waitForFirstPose } from "./page-probe";
 
-describeInBrowser("startup", { demo: true }, ({ open }) => {
+describeInBrowser("startup", { server: "open" }, ({ open }) => {
   test("the page can be used before the stage loads, and the rest follows", async () => {
     const requests: string[] = [];
     let initialRequests: Promise<string[]> | undefined;

@@ -11,7 +11,7 @@ import {
   waitUntilSettled,
 } from "./page-probe";
 
-describeInBrowser("touch", { demo: true }, ({ open }) => {
+describeInBrowser("touch", { server: "open" }, ({ open }) => {
   test("dragging a ring moves the hand, and lifting the finger releases it", async () => {
     // On a small phone the limbs' buttons are below the hands.
     const page = await open("", { viewport: { width: 360, height: 640 }, hasTouch: true, reducedMotion: "reduce" });

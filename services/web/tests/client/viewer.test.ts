@@ -1,107 +1,35 @@
-import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { Viewer, type ViewerStatistics } from "../../src/client/viewer";
+import { describe, expect, test } from "vitest";
+import type { ViewerStatistics } from "../../src/client/viewer";
 import { decodeMotionBlock } from "../../src/codec/motion-decoder";
 import { restPose } from "../../src/motion/skeleton";
-import type { Message, TimelineState } from "../../src/wire/messages";
 import type { Overlay } from "../../src/wire/overlay";
-import { type BlockVectors, goldenDescription, goldenTrack } from "../golden-motion";
-import { goldenCameraBlocks, goldenCameraNumbers, goldenScene } from "../golden-scenes";
-import { decodeBase64, loadVectors } from "../golden-vectors";
+import { goldenDescription, goldenTrack } from "../golden-motion";
 import { FakeWebSocket } from "./fake-websocket";
+import {
+  advanceTime,
+  advanceTimeAnswered,
+  best,
+  createViewer,
+  data,
+  description,
+  EPOCH_US,
+  expectNear,
+  header,
+  isolateViewers,
+  last,
+  lowest,
+  MOTION,
+  now,
+  openViewer,
+  timeline,
+  viewer,
+} from "./viewer-suite";
 
-const EPOCH_US = 1_774_000_000_000_000;
-const SESSION = "ws://stage/v1/sessions/s1/stream";
-const MOTION = "ws://stage/v1/motions/dance/stream?rate=1";
-const golden = loadVectors<BlockVectors>("blocks").valid;
-const [best, lowest, , last] = golden.map((vector) => decodeBase64(vector.block));
-
-let now = 0;
-/** Number of pings that were answered. */
-let answeredCount = 0;
-let viewer: Viewer;
-
-beforeEach(() => {
-  FakeWebSocket.install();
-  now = answeredCount = 0;
-});
-afterEach(() => {
-  viewer.close();
-  FakeWebSocket.remove();
-});
-
-/** Advance the local clock and the timers. */
-function advanceTime(ms: number): void {
-  now += ms;
-  vi.advanceTimersByTime(ms);
-}
-
-function header(motion = "dance"): Message {
-  return {
-    name: "ChannelHeader",
-    motion,
-    now: EPOCH_US + now * 1000,
-    channels: 19,
-    software: "0",
-    version: 1,
-    clock: "unix",
-  };
-}
-
-function description(motion = "dance"): Message {
-  return { name: "Description", motion, first: null, tracks: [{ type: "song" }, goldenDescription()] };
-}
-
-function timeline(change: Partial<TimelineState> = {}): Message {
-  return {
-    name: "TimelineState",
-    epoch: 1,
-    motion: "dance",
-    clock: EPOCH_US,
-    position: 0,
-    playing: true,
-    loop: true,
-    duration: 2_600_000,
-    ...change,
-  };
-}
-
-function data(index: number, rate: number, block: Uint8Array): Message {
-  return { name: "Data", track: 1, rate, index, block };
-}
-
-/** Advance time; the server answers each ping after 40 ms. */
-function advanceTimeAnswered(ms: number): void {
-  for (const end = now + ms; now < end; ) {
-    advanceTime(Math.min(20, end - now));
-    for (const { sequence, sent } of FakeWebSocket.last.messagesOf("Ping")) {
-      if (sequence < answeredCount || now * 1000 - sent < 40_000) continue;
-      answeredCount = sequence + 1;
-      FakeWebSocket.last.receive({
-        name: "Pong",
-        sequence,
-        sent,
-        received: EPOCH_US + sent + 20_000,
-        answered: EPOCH_US + sent + 20_000,
-      });
-    }
-  }
-}
-
-/** Open a viewer that received the header, the description and a timeline that starts now. */
-function openViewer(url = SESSION): Viewer {
-  viewer = new Viewer({ url, now: () => now, solver: null });
-  FakeWebSocket.last.accept();
-  FakeWebSocket.last.receive(header(), description(), timeline());
-  return viewer;
-}
-
-function expectNear(actual: Float64Array, expected: Float64Array): void {
-  expected.forEach((value, i) => expect(Math.abs(actual[i] - value)).toBeLessThan(1e-9));
-}
+isolateViewers();
 
 describe("start", () => {
   test("state is empty before the first message", () => {
-    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
+    createViewer();
     expect(viewer.poseAt(0)).toBeNull();
     expect([viewer.figure, viewer.timeline, viewer.presence, viewer.motion]).toEqual([null, null, null, null]);
     expect([viewer.duration, viewer.blocks.length, viewer.ladder.length]).toEqual([0, 0, 0]);
@@ -109,7 +37,7 @@ describe("start", () => {
   });
 
   test("events are dispatched, and the first block is shown before a clock sample", () => {
-    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
+    createViewer();
     const events: string[] = [];
     for (const event of ["open", "figure", "timeline", "blocks", "presence"]) {
       viewer.addEventListener(event, () => events.push(event));
@@ -246,173 +174,6 @@ test("reports buffer and drawing time once per second", () => {
   expect(FakeWebSocket.last.messagesOf("Report")).toHaveLength(3);
 });
 
-describe("camera and light", () => {
-  const filmedDescription = (): Message => ({
-    name: "Description",
-    motion: "filmed",
-    first: null,
-    tracks: [goldenScene(1), goldenDescription(), goldenScene(0)],
-  });
-  const cameraData = (index: number, rate: number): Message => ({
-    name: "Data",
-    track: 2,
-    rate,
-    index,
-    block: goldenCameraBlocks[rate][index],
-  });
-
-  test("have the position of the motion", () => {
-    openViewer();
-    FakeWebSocket.last.receive(header("filmed"), filmedDescription(), timeline({ epoch: 2, motion: "filmed" }));
-    expect(viewer.scenes.map(({ kind }) => kind)).toEqual(["light", "camera"]);
-    expect(viewer.cameraAt(now)).toBeNull();
-    FakeWebSocket.last.receive(cameraData(0, 0), cameraData(0, 1), cameraData(1, 1), data(0, 1, best));
-    expect([viewer.damagedCount, ...viewer.blocks]).toEqual([0, 1, -1, -1]);
-    expectNear(viewer.cameraAt(now)!, Float64Array.from(goldenCameraNumbers(0)[0]));
-    expect(viewer.sceneAt(now, 1)).toEqual(viewer.cameraAt(now));
-    expect([viewer.sceneAt(now, 0), viewer.sceneAt(now, 2)]).toEqual([null, null]);
-    expect(viewer.poseAt(now)).not.toBeNull();
-    now = (26 / 30) * 1000;
-    viewer.cameraAt(now)!.forEach((value, i) => expect(value).toBeCloseTo(goldenCameraNumbers(1)[0][i], 6));
-  });
-
-  test("may be described after the motion", () => {
-    openViewer();
-    const events: string[] = [];
-    for (const event of ["figure", "tracks"]) viewer.addEventListener(event, () => events.push(event));
-    const furtherTracks = (first: number, motion = "filmed"): Message => ({
-      name: "Description",
-      motion,
-      first,
-      tracks: [goldenScene(1), goldenScene(0)],
-    });
-    FakeWebSocket.last.receive(header("filmed"), furtherTracks(1), {
-      ...filmedDescription(),
-      tracks: [goldenDescription()],
-    } as Message);
-    FakeWebSocket.last.receive(timeline({ epoch: 2, motion: "filmed" }), cameraData(0, 1));
-    expect([viewer.cameraAt(now), viewer.scenes.length]).toEqual([null, 0]);
-    FakeWebSocket.last.receive(furtherTracks(1, "another"), furtherTracks(1), furtherTracks(1), cameraData(0, 1));
-    expect(viewer.scenes.map(({ kind }) => kind)).toEqual(["light", "camera"]);
-    expectNear(viewer.cameraAt(now)!, Float64Array.from(goldenCameraNumbers(0)[0]));
-    expect(events).toEqual(["figure", "tracks"]);
-  });
-
-  test("are dropped with their motion", () => {
-    openViewer();
-    FakeWebSocket.last.receive(
-      header("filmed"),
-      filmedDescription(),
-      timeline({ epoch: 2, motion: "filmed" }),
-      cameraData(0, 1),
-    );
-    expect(viewer.cameraAt(now)).not.toBeNull();
-    FakeWebSocket.last.receive(header(), description());
-    expect([viewer.cameraAt(now), viewer.scenes.length]).toEqual([null, 0]);
-    FakeWebSocket.last.receive(timeline({ epoch: 3 }));
-    expect(viewer.cameraAt(now)).toBeNull();
-  });
-
-  test("that are damaged are counted", () => {
-    openViewer();
-    FakeWebSocket.last.receive(header("filmed"), filmedDescription(), timeline({ epoch: 2, motion: "filmed" }));
-    FakeWebSocket.last.receive({ name: "Data", track: 2, rate: 0, index: 0, block: best.subarray(0, 0) });
-    FakeWebSocket.last.receive({ name: "Data", track: 2, rate: 0, index: 9, block: goldenCameraBlocks[0][0] });
-    expect(viewer.damagedCount).toBe(2);
-  });
-});
-
-describe("lost connection", () => {
-  test("is re-established; blocks and playback continue meanwhile", () => {
-    openViewer();
-    const reasons: string[] = [];
-    viewer.addEventListener("closed", (event) => reasons.push((event as CustomEvent<string>).detail));
-    FakeWebSocket.last.receive(data(0, 1, best));
-    FakeWebSocket.last.endWith(1006);
-    expect(viewer.statistics().reason).toBe("the connection was lost");
-    advanceTime(250);
-    expect(viewer.positionAt(now)).toBeCloseTo(0.25, 9);
-    expect(viewer.poseAt(now)).not.toBeNull();
-    FakeWebSocket.last.accept();
-    FakeWebSocket.last.receive(header(), description(), timeline({ epoch: 1, position: 100_000 }));
-    expect([...viewer.blocks]).toEqual([1, -1, -1]);
-    expect(viewer.positionAt(now)).toBeCloseTo(0.35, 9);
-    expect(reasons).toEqual(["the connection was lost"]);
-    expect(viewer.isClosed).toBe(false);
-  });
-
-  test("blocks are dropped with the motion", () => {
-    openViewer();
-    FakeWebSocket.last.receive(data(0, 1, best));
-    FakeWebSocket.last.receive(header("other"), description("other"));
-    expect(viewer.poseAt(now)).toBeNull();
-    expect([...viewer.blocks]).toEqual([-1, -1, -1]);
-    FakeWebSocket.last.receive(timeline({ epoch: 2, motion: "other" }), data(0, 0, lowest));
-    expect(viewer.poseAt(now)).not.toBeNull();
-    expect(viewer.motion).toBe("other");
-  });
-
-  test("private timeline resumes at its position", () => {
-    openViewer(MOTION);
-    FakeWebSocket.last.receive(data(0, 1, best));
-    advanceTime(400);
-    FakeWebSocket.last.receive(timeline({ epoch: 2, clock: EPOCH_US, position: 700_000, playing: false, loop: false }));
-    FakeWebSocket.last.endWith(1006);
-    advanceTime(250);
-    const clock = EPOCH_US + 650_000;
-    expect(FakeWebSocket.last.url).toBe(
-      `ws://stage/v1/motions/dance/stream?rate=1&have=dance.0.1--.2&at=0.700000&clock=${clock}`,
-    );
-    FakeWebSocket.last.accept();
-    FakeWebSocket.last.receive(header(), description(), timeline({ position: 700_000 }));
-    expect(FakeWebSocket.last.messagesOf("Edit")).toEqual([
-      { name: "Edit", playing: false, position: null, loop: false },
-    ]);
-  });
-
-  test("held blocks are listed in a session, too", () => {
-    openViewer();
-    FakeWebSocket.last.receive(data(0, 1, best));
-    FakeWebSocket.last.endWith(1006);
-    advanceTime(250);
-    expect(new URL(FakeWebSocket.last.url).searchParams.get("have")).toBe("dance.0.1--.2");
-    expect(new URL(FakeWebSocket.last.url).searchParams.has("at")).toBe(false);
-  });
-
-  test("silent connection is replaced, and the private timeline resumes", () => {
-    openViewer(MOTION);
-    FakeWebSocket.last.receive(
-      data(0, 1, best),
-      timeline({ epoch: 2, clock: EPOCH_US, position: 700_000, playing: false, loop: false }),
-    );
-    const events: string[] = [];
-    for (const event of ["open", "replaced", "closed"]) viewer.addEventListener(event, () => events.push(event));
-    const silent = FakeWebSocket.last;
-    // the pings are not answered
-    advanceTime(6_500);
-    expect(FakeWebSocket.opened.length).toBeGreaterThan(1);
-    expect(FakeWebSocket.last.url).toContain("have=dance.0.1--.2&at=0.700000");
-    FakeWebSocket.last.accept();
-    expect([events, silent.readyState]).toEqual([[], 1]);
-    FakeWebSocket.last.receive(header(), description(), timeline({ position: 700_000 }));
-    expect([events, silent.readyState]).toEqual([["open", "replaced"], 3]);
-    expect(FakeWebSocket.last.messagesOf("Edit")).toEqual([
-      { name: "Edit", playing: false, position: null, loop: false },
-    ]);
-    expect(FakeWebSocket.last.messagesOf("Ping")).toHaveLength(1);
-    expect([...viewer.blocks]).toEqual([1, -1, -1]);
-  });
-
-  test("missing session is final", () => {
-    openViewer();
-    FakeWebSocket.last.endWith(4404);
-    advanceTime(60_000);
-    expect(FakeWebSocket.opened).toHaveLength(1);
-    expect(viewer.isClosed).toBe(true);
-    expect(viewer.statistics().reason).toBe("there is no such motion or session");
-  });
-});
-
 describe("invalid input", () => {
   test("damaged block is skipped and counted", () => {
     openViewer();
@@ -446,7 +207,7 @@ describe("invalid input", () => {
     ["no levels", [{ ...goldenDescription(), rates: [] }], "motion track: rates must"],
     ["an empty level", [{ ...goldenDescription(), rates: [null] }], "rate 0 must have kbps"],
   ])("%s closes the connection with the reason", (_, tracks, why) => {
-    viewer = new Viewer({ url: SESSION, now: () => now, solver: null });
+    createViewer();
     FakeWebSocket.last.accept();
     FakeWebSocket.last.receive(header(), { name: "Description", motion: "dance", first: null, tracks });
     expect(viewer.isClosed).toBe(true);

@@ -29,7 +29,7 @@ const DRAGS: Readonly<Record<string, readonly [limb: number, x: number, y: numbe
   You: [1, -130, -160],
 };
 
-describeInBrowser("pictures", { demo: true, timeout: 400_000 }, (fixture) => {
+describeInBrowser("pictures", { server: "open", timeout: 400_000 }, (fixture) => {
   test("desktop in both themes", async () => {
     mkdirSync(PICTURE_FOLDER, { recursive: true });
     const page = await openStage(fixture, "dark", DESKTOP);

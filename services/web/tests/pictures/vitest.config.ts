@@ -2,5 +2,10 @@
 import { defineConfig } from "vitest/config";
 
 export default defineConfig({
-  test: { include: ["tests/pictures/*.pictures.ts"], environment: "node", fileParallelism: false },
+  test: {
+    include: ["tests/pictures/*.pictures.ts"],
+    environment: "node",
+    fileParallelism: false,
+    globalSetup: "tests/browser/global-setup.ts",
+  },
 });
