@@ -14,6 +14,7 @@ from bunraku.codec.container import StoredMotion, unpack_motion
 from bunraku.codec.errors import DamagedBlock
 from bunraku.storage.object_folder import StoredObject
 from bunraku.storage.object_storage import ObjectStorage
+from bunraku.storage.record import is_motion_id
 
 MAX_CACHE_BYTES = 64 << 20
 OBJECT_FOLDERS = ("motions", "sources", "logs", "notes")
@@ -46,7 +47,7 @@ class MotionStore:
     async def get(self, motion_id: str) -> StoredMotion | None:
         """Return a motion, None if it does not exist, is damaged or is in an unsupported codec."""
         # never use a string as a path that cannot be an id
-        if not (motion_id.isascii() and motion_id.isalnum()):
+        if not is_motion_id(motion_id):
             return None
         if motion_id in self._cache:
             self._cache.move_to_end(motion_id)

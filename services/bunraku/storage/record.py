@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+_MOTION_ID_PATTERN = re.compile(r"[A-Za-z0-9]{1,64}")
+
+
+def is_motion_id(text: str) -> bool:
+    """Return whether a text of a client may be the id of a motion. Databases and file systems reject others."""
+    return _MOTION_ID_PATTERN.fullmatch(text) is not None
 
 
 class InvalidCursor(ValueError):
