@@ -59,6 +59,19 @@ class Share:
     motion: str | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class ShareScope:
+    """Viewer links that a client may list and revoke: those with these values, of which None is any."""
+
+    subject: str | None = None
+    session: str | None = None
+    motion: str | None = None
+
+    def includes(self, share: Share) -> bool:
+        """Return whether a link is one of them."""
+        return all(getattr(self, name) in (None, getattr(share, name)) for name in ("subject", "session", "motion"))
+
+
 class JobHold(NamedTuple):
     """Hold of a replica on a job. `until` changes while the replica works; 0: the job is released."""
 
