@@ -9,6 +9,7 @@ import logging
 import re
 from collections import OrderedDict
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 from bunraku.codec.container import StoredMotion, unpack_motion
 from bunraku.codec.errors import DamagedBlock
@@ -84,9 +85,9 @@ class MotionStore:
         """Return a note, None if it does not exist."""
         return await self._objects.get(f"notes/{name}")
 
-    async def put_source(self, name: str, data: bytes) -> None:
+    async def put_source(self, name: str, source: Path) -> None:
         """Store an uploaded file; `name` is derived from its hash, one word."""
-        await self._objects.put(f"sources/{name}", data)
+        await self._objects.put_file(f"sources/{name}", source)
 
     async def get_source(self, name: str) -> bytes | None:
         """Return an uploaded file, None if it does not exist."""
