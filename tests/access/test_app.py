@@ -109,3 +109,20 @@ def test_bound_token_creates_links_within_its_bound_only(http: httpx2.Client, mo
         requests = ({"session": session}, {"session": other}, {"motion": motion})
         statuses = [http.post("/v1/shares", json=body, headers=headers).status_code for body in requests]
         assert statuses == expected
+
+
+@pytest.mark.parametrize("kind", ["session", "motion"])
+def test_bound_token_sees_and_revokes_links_within_its_bound_only(http: httpx2.Client, motion: str, kind: str) -> None:
+    session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
+    other = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
+    subject = f"host of {kind}"
+    unbound = bearer_headers(make_token(Role.CONTROL, subject))
+    targets = [{"session": session}, {"session": other}, {"motion": motion}]
+    links = [http.post("/v1/shares", json=target, headers=unbound).json()["id"] for target in targets]
+    headers = bearer_headers(make_token(Role.CONTROL, subject, **{kind: {"session": session, "motion": motion}[kind]}))
+    own = links[0] if kind == "session" else links[2]
+    assert [link["id"] for link in http.get("/v1/shares", headers=headers).json()["items"]] == [own]
+    for link in links:
+        status = http.delete(f"/v1/shares/{link}", headers=headers).status_code
+        assert status == (204 if link == own else 404)
+    assert len(http.get("/v1/shares", headers=unbound).json()["items"]) == 2

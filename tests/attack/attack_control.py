@@ -6,73 +6,74 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from bunraku.wire.messages import Alive, Ask, Claim, Edit, Input, Ping, Release
+from bunraku.wire.messages import Alive, Ask, Claim, Edit, Input, Message, Ping, Release
 from tests.attack.attack_socket import BINARY, CALM, CLOSED_1008, MAX_WRITE_DEADLINE_S, PING, flood_and_read, repeat
 from tests.attack.raw_socket import connect_websocket, frame
 from tests.attack.registry import Report, Target, attack
 
 
-async def flood_control(target: Target, report: Report, make: Callable[[int], bytes], must_close: bool = False) -> None:
-    """Flood a control connection with the messages that `make` returns for successive numbers."""
-    messages = repeat(*(frame(BINARY, make(number)) for number in range(64)))
-    await flood_and_read(
-        target, report, target.control, messages, token=target.tokens["control"], must_close=must_close
-    )
+def _control_flood(name: str, about: str, data: bytes, *, must_close: bool = False, connections: int = 1) -> None:
+    """Register a flood of frames on control connections of the session."""
+
+    async def run(target: Target, report: Report) -> None:
+        token = target.tokens["control"]
+        await asyncio.gather(*(
+            flood_and_read(target, report, target.control, data, token=token, must_close=must_close)
+            for _ in range(connections)
+        ))  # fmt: skip
+
+    run.__name__, run.__doc__ = name, about
+    attack(2, CLOSED_1008 if must_close else CALM)(run)
 
 
-@attack(2, CLOSED_1008)
-async def ping_frames_on_a_control_connection(target: Target, report: Report) -> None:
-    """Flood a control connection with Ping frames."""
-    data = repeat(frame(PING))
-    await flood_and_read(target, report, target.control, data, token=target.tokens["control"])
+def _messages(make: Callable[[int], Message]) -> bytes:
+    """Return frames of the messages that `make` returns for successive numbers."""
+    return repeat(*(frame(BINARY, make(number).pack()) for number in range(64)))
 
 
-@attack(2, CLOSED_1008)
-async def unknown_messages_on_a_control_connection(target: Target, report: Report) -> None:
-    """Flood a control connection with messages of unknown types."""
-    await flood_control(target, report, lambda _: b"\xc8", must_close=True)
-
-
-@attack(2, CALM)
-async def clock_pings_on_a_control_connection(target: Target, report: Report) -> None:
-    """Flood a control connection with clock messages."""
-    await flood_control(target, report, lambda number: Ping(number, number).pack())
-
-
-@attack(2, CALM)
-async def claims_and_releases(target: Target, report: Report) -> None:
-    """Flood a control connection with claims and releases of all limbs."""
-    await flood_control(
-        target, report, lambda number: (Release(number % 16, 1) if number & 1 else Claim(number % 16)).pack()
-    )
-
-
-@attack(2, CALM)
-async def requests_for_a_held_limb(target: Target, report: Report) -> None:
-    """Flood a control connection with requests for a held limb and their withdrawals."""
-    await flood_control(target, report, lambda number: Ask(0, bool(number & 1)).pack())
-
-
-@attack(2, CALM)
-async def keep_alive_messages(target: Target, report: Report) -> None:
-    """Flood a control connection with keep-alive messages for all limbs."""
-    await flood_control(target, report, lambda _: Alive(list(range(16))).pack())
-
-
-@attack(2, CALM)
-async def inputs_for_a_held_limb(target: Target, report: Report) -> None:
-    """Flood a control connection with inputs for a limb that another puppeteer holds."""
-    await flood_control(target, report, lambda number: Input(0, 1, 1, number, number, (0.4, 0.1, 0.4)).pack())
-
-
-@attack(2, CALM)
-async def inputs_of_eight_puppeteers(target: Target, report: Report) -> None:
-    """Flood eight control connections with inputs and claims."""
-
-    def make(number: int) -> bytes:
-        return Input(number % 16, 0, 1, number, 0, (1.0, -1.0, 1.0)).pack() if number % 4 else Claim(3).pack()
-
-    await asyncio.gather(*(flood_control(target, report, make) for _ in range(8)))
+_control_flood(
+    "ping_frames_on_a_control_connection",
+    "Flood a control connection with Ping frames.",
+    repeat(frame(PING)),
+    must_close=True,
+)
+_control_flood(
+    "unknown_messages_on_a_control_connection",
+    "Flood a control connection with messages of unknown types.",
+    repeat(frame(BINARY, b"\xc8")),
+    must_close=True,
+)
+_control_flood(
+    "clock_pings_on_a_control_connection",
+    "Flood a control connection with clock messages.",
+    _messages(lambda number: Ping(number, number)),
+)
+_control_flood(
+    "claims_and_releases",
+    "Flood a control connection with claims and releases of all limbs.",
+    _messages(lambda number: Release(number % 16, 1) if number & 1 else Claim(number % 16)),
+)
+_control_flood(
+    "requests_for_a_held_limb",
+    "Flood a control connection with requests for a held limb and their withdrawals.",
+    _messages(lambda number: Ask(0, bool(number & 1))),
+)
+_control_flood(
+    "keep_alive_messages",
+    "Flood a control connection with keep-alive messages for all limbs.",
+    _messages(lambda _: Alive(list(range(16)))),
+)
+_control_flood(
+    "inputs_for_a_held_limb",
+    "Flood a control connection with inputs for a limb that another puppeteer holds.",
+    _messages(lambda number: Input(0, 1, 1, number, number, (0.4, 0.1, 0.4))),
+)
+_control_flood(
+    "inputs_of_eight_puppeteers",
+    "Flood eight control connections with inputs and claims.",
+    _messages(lambda number: Input(number % 16, 0, 1, number, 0, (1.0, -1.0, 1.0)) if number % 4 else Claim(3)),
+    connections=8,
+)
 
 
 @attack(2, CALM)

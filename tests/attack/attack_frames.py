@@ -70,54 +70,41 @@ async def violations_of_the_protocol(target: Target, report: Report) -> None:
             opened.close()
 
 
-@attack(18, QUIET, quick=True)
-async def random_bytes_on_control_connections(target: Target, report: Report) -> None:
-    """Send random frames and messages on control connections, some of which are reset at once."""
-    source = random.Random(18)
+async def _send_random_frames(target: Target, report: Report, paths: tuple[str, ...], role: str, seed: int) -> None:
+    """Send random frames and messages on sockets of these paths, some of which are reset at once."""
+    source = random.Random(seed)
     until = time.monotonic() + target.seconds
 
     async def run(address: int) -> None:
         while time.monotonic() < until:
-            opened = await connect_websocket(target, target.control, target.tokens["control"], address=address)
+            opened = await connect_websocket(target, source.choice(paths), target.tokens[role], address=address)
             if opened is None:
                 report.count("refused")
                 await asyncio.sleep(0.05)
                 continue
-            data = b"".join(_random_frame(source) for _ in range(source.randint(1, 8)))
-            await opened.send(data)
+            await opened.send(b"".join(_random_frame(source) for _ in range(source.randint(1, 8))))
             if source.random() < 0.4:
                 opened.reset()
                 report.count("reset")
                 continue
             code = await opened.read_close_code(0.2)
             report.count(str(code))
-            report.require(code != 1011, "a control connection was closed with 1011")
+            report.require(code != 1011, "a connection was closed with 1011")
             opened.close()
 
     await asyncio.gather(*(run(address) for address in range(1, 5)))
 
 
+@attack(18, QUIET, quick=True)
+async def random_bytes_on_control_connections(target: Target, report: Report) -> None:
+    """Send random frames and messages on control connections."""
+    await _send_random_frames(target, report, (target.control,), "control", 18)
+
+
 @attack(18, QUIET)
 async def random_bytes_on_streams(target: Target, report: Report) -> None:
     """Send random frames and messages on streams of a session and of a motion."""
-    source = random.Random(81)
-    until = time.monotonic() + target.seconds
-
-    async def run(address: int) -> None:
-        while time.monotonic() < until:
-            path = source.choice((target.stream, target.motion_stream))
-            opened = await connect_websocket(target, path, target.tokens["view"], address=address)
-            if opened is None:
-                report.count("refused")
-                await asyncio.sleep(0.05)
-                continue
-            await opened.send(b"".join(_random_frame(source) for _ in range(source.randint(1, 8))))
-            code = await opened.read_close_code(0.2)
-            report.count(str(code))
-            report.require(code != 1011, "a stream was closed with 1011")
-            opened.reset()
-
-    await asyncio.gather(*(run(address) for address in range(1, 5)))
+    await _send_random_frames(target, report, (target.stream, target.motion_stream), "view", 81)
 
 
 @attack(18, QUIET)

@@ -73,10 +73,12 @@ class Lab:
             before = self._meter.measure()
             logged = self.server.logged_bytes() if self.server is not None else 0
             with self._meter.record_peak() as peak:
+                began = time.monotonic()
                 self._observer.request("mark")
                 attacker.write_line("go")
                 self._follow(attack, attacker, result)
                 gaps = self._observer.request("gaps")
+                result.set_processor_shares(before, self._meter.measure(), time.monotonic() - began)
         result.gap_ms.after = self._measure_gaps(self._window_s)["p99"]
         # a calm window beside another program is not as calm as the first one
         calm = max(self.calm_ms, min(result.gap_ms.before, 2 * self.calm_ms))

@@ -22,6 +22,7 @@ MASK = b"\x37\xfa\x21\x3d"
 CLOSED = "closed without an answer"
 OPEN = "still open"
 MAX_KEPT_MESSAGES = 64
+MAX_RESPONSE_BYTES = 32 << 20
 ANSWER_TIMEOUT_S = 10.0
 """Time for an answer that the server owes at once, seconds: long enough for a busy machine."""
 
@@ -113,7 +114,9 @@ class RawSocket:
         self.is_closed = self.is_closed or not data
         return data
 
-    async def read_response(self, timeout_s: float = ANSWER_TIMEOUT_S, max_bytes: int = 32 << 20) -> Response | None:
+    async def read_response(
+        self, timeout_s: float = ANSWER_TIMEOUT_S, max_bytes: int = MAX_RESPONSE_BYTES
+    ) -> Response | None:
         """Return the next response, interim ones skipped; None without a complete header within the timeout."""
         until = time.monotonic() + timeout_s
         while (end := self._received.find(b"\r\n\r\n")) < 0:
@@ -260,7 +263,8 @@ async def fetch(
                 opened.send(request(target, method, path, *lines, token=token, body=body), timeout_s)
             )
             try:
-                return await opened.read_response(timeout_s)
+                # the response to HEAD announces a body that does not follow
+                return await opened.read_response(timeout_s, 0 if method == "HEAD" else MAX_RESPONSE_BYTES)
             finally:
                 sending.cancel()
                 await asyncio.gather(sending, return_exceptions=True)

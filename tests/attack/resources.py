@@ -15,16 +15,26 @@ SAMPLE_INTERVAL_S = 0.1
 
 @dataclass(frozen=True)
 class Resources:
-    """Memory of services and of all their processes in MB, and open descriptors of the services."""
+    """Memory of services and of all their processes in MB, open descriptors of the services, and processor time.
+
+    `cpu_s` is the time for which their main threads, with the event loops, have run; `wait_s` that for which they could
+    have run, but other processes had the processors.
+    """
 
     rss_mb: float
     tree_mb: float
     descriptors: int
+    cpu_s: float = 0.0
+    wait_s: float = 0.0
 
     def maximum(self, other: Resources) -> Resources:
         """Return the maximum of each value."""
         return Resources(
-            max(self.rss_mb, other.rss_mb), max(self.tree_mb, other.tree_mb), max(self.descriptors, other.descriptors)
+            max(self.rss_mb, other.rss_mb),
+            max(self.tree_mb, other.tree_mb),
+            max(self.descriptors, other.descriptors),
+            max(self.cpu_s, other.cpu_s),
+            max(self.wait_s, other.wait_s),
         )
 
 
@@ -42,6 +52,7 @@ class ResourceMeter:
             round(sum(map(resident_mb, services)), 1),
             round(sum(map(resident_mb, tree)), 1),
             sum(map(count_descriptors, services)),
+            *(sum(times) for times in zip(*map(processor_times_s, services), strict=True)),
         )
 
     @contextmanager
@@ -114,6 +125,18 @@ def resident_mb(pid: int) -> float:
     except (OSError, IndexError):
         return 0.0
     return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def processor_times_s(pid: int) -> tuple[float, float]:
+    """Return the time for which the main thread of a process has run, and for which it has waited for a processor.
+
+    See "schedstat" in Documentation/scheduler/sched-stats.rst of the Linux kernel.
+    """
+    try:
+        run_ns, wait_ns, _ = Path(f"/proc/{pid}/task/{pid}/schedstat").read_text().split()
+    except (OSError, ValueError):
+        return 0.0, 0.0
+    return int(run_ns) / 1e9, int(wait_ns) / 1e9
 
 
 def count_descriptors(pid: int) -> int:

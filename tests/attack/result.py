@@ -30,7 +30,9 @@ class Phases:
 class AttackResult:
     """Figures of one attack: overlay gap p99 in ms, memory in MB, descriptors, and answers of the server.
 
-    `gap_ratio` compares the gap during the attack with the calm one. `held` is None if the attack could not be made.
+    `gap_ratio` compares the gap during the attack with the calm one. `cpu_share` is the share of the attack for which
+    the server's event loop ran, `wait_share` that for which it waited for a processor that other processes had. `held`
+    is None if the attack could not be made.
     """
 
     name: str
@@ -42,6 +44,8 @@ class AttackResult:
     rss_mb: Phases = field(default_factory=Phases)
     tree_mb: Phases = field(default_factory=Phases)
     descriptors: Phases = field(default_factory=Phases)
+    cpu_share: float | None = None
+    wait_share: float | None = None
     answers: dict[str, int] = field(default_factory=dict)
     violations: list[str] = field(default_factory=list)
     skipped: str = ""
@@ -62,6 +66,11 @@ class AttackResult:
         self.rss_mb = Phases(before.rss_mb, during.rss_mb, after.rss_mb)
         self.tree_mb = Phases(before.tree_mb, during.tree_mb, after.tree_mb)
         self.descriptors = Phases(before.descriptors, during.descriptors, after.descriptors)
+
+    def set_processor_shares(self, before: Resources, after: Resources, seconds: float) -> None:
+        """Set the shares of the duration of an attack for which the server ran, and waited for a processor."""
+        self.cpu_share = round((after.cpu_s - before.cpu_s) / seconds, 3)
+        self.wait_share = round((after.wait_s - before.wait_s) / seconds, 3)
 
     def judge_gap(self, calm_ms: float, gaps: dict[str, Any], max_ratio: float) -> None:
         """Compare the gaps during the attack with the calm ones, and check that no viewer was disconnected."""
@@ -88,10 +97,11 @@ class AttackResult:
         """Format the result as a row of the table, with its violations below."""
         answers = ", ".join(f"{answer}: {number}" for answer, number in list(self.answers.items())[:6])
         state = "skipped: " + self.skipped if self.skipped else "held" if self.held else "FAILED"
+        shares = "" if self.cpu_share is None else f"loop runs {self.cpu_share:.0%} waits {self.wait_share:.0%}"
         row = (
             f"{self.row:>2} {self.name:<45} {state:<7} gap {self.gap_ms} ms"
             f" {'' if self.gap_ratio is None else f'({self.gap_ratio:.2f}x)':<8} RSS {self.rss_mb} MB"
-            f" (tree {self.tree_mb})  fds {self.descriptors}  [{answers}]"
+            f" (tree {self.tree_mb})  {shares}  fds {self.descriptors}  [{answers}]"
         )
         return "\n".join([row, *(f"{'':>8}{violation}" for violation in self.violations)])
 

@@ -87,6 +87,13 @@ def test_memory_and_descriptors_left_are_violations() -> None:
     assert result.violations == ["RSS grew by 51 MB, at most 50 MB are permitted", "50 descriptors are still open"]
 
 
+def test_processor_shares_are_reported() -> None:
+    result = AttackResult("x", 1, "calm")
+    result.set_processor_shares(Resources(1.0, 1.0, 1, 2.0, 1.0), Resources(1.0, 1.0, 1, 3.0, 3.0), 4.0)
+    assert (result.cpu_share, result.wait_share) == (0.25, 0.5)
+    assert "loop runs 25% waits 50%" in result.format_row()
+
+
 def test_order_of_system_calls_is_checked() -> None:
     calls = [
         '1 fsync(9</d/library/.tmp1>) = 0',
@@ -110,7 +117,9 @@ def test_tracebacks_in_the_log_are_counted(tmp_path: Path) -> None:
             log.write('{"exception": "Traceback (most recent call last):\\n  File \\"a\\"\\nValueError: wrong"}\n')
         assert server.tracebacks_since(offset) == ['ValueError: wrong"}']
         assert server.tracebacks_since(server.logged_bytes()) == []
-        assert server.meter.measure().rss_mb > 10.0
+        measured = server.meter.measure()
+        assert measured.rss_mb > 10.0
+        assert measured.cpu_s > 0.0
     assert server.process.poll() is not None
 
 

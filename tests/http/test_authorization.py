@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import dataclasses
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -15,7 +16,12 @@ from starlette.routing import Mount
 from bunraku.access.app import create_app as access
 from bunraku.http import authorization, problem_details
 from bunraku.http.access_control import Role, access_of, requires
-from bunraku.http.authorization import AuthorizationMiddleware, UndeclaredRequirement, collect_route_rules
+from bunraku.http.authorization import (
+    MAX_REQUESTS_WITH_BODY_PER_HOLDER,
+    AuthorizationMiddleware,
+    UndeclaredRequirement,
+    collect_route_rules,
+)
 from bunraku.ik.app import create_app as ik
 from bunraku.ingest.app import create_app as ingest
 from bunraku.runtime.context import open_context
@@ -153,6 +159,35 @@ async def test_too_large_body_is_rejected_with_and_without_length(tmp_path: Path
             assert answer.status_code == 413
             assert answer.headers["content-type"] == "application/problem+json"
             assert "100 bytes" in answer.json()["detail"]
+
+
+async def test_unfinished_bodies_are_limited_by_subject(tmp_path: Path) -> None:
+    unfinished, all_begun, end = 0, asyncio.Event(), asyncio.Event()
+
+    async def body() -> AsyncIterator[bytes]:
+        nonlocal unfinished
+        unfinished += 1
+        if unfinished == MAX_REQUESTS_WITH_BODY_PER_HOLDER:
+            all_begun.set()
+        yield b"x"
+        await end.wait()
+
+    async with protected_app(tmp_path, secret=SecretStr(SECRET)) as (_, http):
+
+        async def put(subject: str, content: bytes | AsyncIterator[bytes]) -> httpx2.Response:
+            headers = bearer_headers(make_token(Role.VIEW, subject))
+            return await http.put("/v1/changed", content=content, headers=headers)
+
+        begun = [asyncio.create_task(put("hostile", body())) for _ in range(MAX_REQUESTS_WITH_BODY_PER_HOLDER)]
+        async with asyncio.timeout(120):
+            await all_begun.wait()
+        refused = await put("hostile", b"x")
+        assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
+        assert (await put("hostile", b"")).status_code == 200
+        assert (await put("calm", b"x")).status_code == 200
+        end.set()
+        assert {one.status_code for one in await asyncio.gather(*begun)} == {200}
+        assert (await put("hostile", b"x")).status_code == 200
 
 
 async def test_invalid_tokens_are_rate_limited_by_address(tmp_path: Path) -> None:

@@ -141,6 +141,17 @@ async def test_malformed_request_is_answered_and_closed(url: str, data: bytes, s
         assert b'"status": %d' % status in received
 
 
+async def test_rejection_of_a_head_request_has_no_body(url: str) -> None:
+    head = b"HEAD /v1/health HTTP/1.1\r\nHost: 127.0.0.1\r\n"
+    received = await exchange(url, head + b"a: " + b"b" * 9_000 + b"\r\n\r\n")
+    assert received.startswith(b"HTTP/1.1 431")
+    assert received.endswith(b"\r\n\r\n")
+    # the next request of a connection is not one with HEAD
+    received = await exchange(url, head + b"\r\nnonsense\r\n\r\n")
+    assert received.count(b"HTTP/1.1 ") == 2
+    assert b'"status": 400' in received
+
+
 async def test_response_to_a_client_that_does_not_read_is_bounded(url: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(transport, "WRITE_WINDOW_S", 0.2)
     _, writer = await open_connection(url)

@@ -20,6 +20,7 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import ShareScope
 from bunraku.websocket.subprotocol import CloseConnection
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.disks import fill_disk, mount_small_disk
@@ -114,7 +115,7 @@ async def test_memory_of_revocations_is_bounded(tmp_path: Path, monkeypatch: pyt
         revocations = open_replica(stack, f"sqlite:///{tmp_path}/c.sqlite", bus)[0].revocations
         for number in range(50):
             bus.publish(SHARE_REVOKED_SUBJECT, f"{number:018x}".encode())
-            revocations.revoke_unverified(f"{number:018x}", None, BackendUnavailable("the catalogue", "test"))
+            revocations.revoke_unverified(f"{number:018x}", ShareScope(), BackendUnavailable("the catalogue", "test"))
         bus.publish(SHARE_REVOKED_SUBJECT, b"no id")
         assert len(revocations._pending) == len(revocations._remembered) == len(revocations._unverified) == 5
         assert revocations.is_refused(f"{49:018x}")
@@ -165,7 +166,7 @@ async def test_revocation_during_an_outage_takes_effect_after_it(postgres: Serve
         await asyncio.to_thread(postgres.kill)
         outage = BackendUnavailable("the catalogue", "test")
         for (share, _), subject in zip(shares, ("aiko", "another", None), strict=True):
-            assert authenticator.revocations.revoke_unverified(share.id, subject, outage).status == 503
+            assert authenticator.revocations.revoke_unverified(share.id, ShareScope(subject), outage).status == 503
         with pytest.raises(BackendUnavailable):
             await authenticator.authenticate_token(shares[1][1])
         await asyncio.to_thread(postgres.start)

@@ -151,9 +151,9 @@ async def test_abandoned_job_is_resumed_by_another_replica(
     ids=["bad_file", "disk_full"],
 )
 async def test_only_temporary_failures_are_tried_again(
-    context: ServiceContext, error: ProblemError, attempts: int
+    context: ServiceContext, source: Path, error: ProblemError, attempts: int
 ) -> None:
-    await context.motion_store.put_source("j1", b"uploaded bytes")
+    await context.motion_store.put_source("j1", source)
     await context.catalogue.add_job(Job("j1", 1, DETAILS), "failed", 0)
     replica = QueueReplica(context, error)
     await wait_until_empty(context)
@@ -179,7 +179,7 @@ async def test_job_is_judged_by_the_observers_clock_alone(context: ServiceContex
             async with asyncio.timeout(1.5):
                 await other.first_job_handled.wait()
     await holder.stop()
-    await context.motion_store.put_source("j1", b"uploaded bytes")
+    await context.motion_store.put_source("j1", source)
     await context.catalogue.add_job(Job("j1", 1, DETAILS), "failed", ahead.clock() + TIMING.lease_us)
     async with asyncio.timeout(20):
         await other.first_job_handled.wait()

@@ -24,7 +24,8 @@ async def wait_until_gone(*paths: Path) -> None:
 async def test_objects_of_an_ended_process_are_removed_at_the_start(tmp_path: Path) -> None:
     ended = MotionStore.open(f"file://{tmp_path}/library")
     await ended.put_log("log", b"log")
-    await ended.put_source("source", b"source")
+    (tmp_path / "source").write_bytes(b"source")
+    await ended.put_source("source", tmp_path / "source")
     async with open_context(Settings(data=tmp_path)) as context:
         running = asyncio.create_task(Housekeeping(context, has_library=True).run(0.0))
         await wait_until_gone(tmp_path / "library/logs/log", tmp_path / "library/sources/source")

@@ -119,8 +119,10 @@ async def test_check_of_ten_thousand_rows_reads_pages(stored: Stored, monkeypatc
 async def test_sweep_removes_what_nothing_refers_to(stored: Stored) -> None:
     await stored.add("kept")
     await stored.catalogue.add_job(Job("waiting", 1, {}), "a", 1 << 60)
+    source = stored.library.with_name("source")
+    source.write_bytes(b"file")
     for name in ("waiting", "dead"):
-        await stored.motion_store.put_source(name, b"file")
+        await stored.motion_store.put_source(name, source)
     await stored.motion_store.put("orphan", b"motion")
     await stored.motion_store.put_log("log", b"log")
     await stored.motion_store.put_note("note", b"note")

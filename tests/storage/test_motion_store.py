@@ -81,7 +81,7 @@ async def test_motion_of_another_codec_is_none_until_replaced(tmp_path: Path) ->
     assert await store.get("m1") is not None
 
 
-@pytest.mark.parametrize("motion", ["", "../m1", "a/b", "a//b", "m1\0", "é", ".", "motions/m1"])
+@pytest.mark.parametrize("motion", ["", "../m1", "a/b", "a//b", "m1\0", "é", ".", "motions/m1", "a" * 7_000])
 async def test_malformed_id_is_not_found(tmp_path: Path, motion: str) -> None:
     store = MotionStore.open(f"file://{tmp_path}")
     await store.put("m1", pack_motion("m1", ENCODED))

@@ -6,12 +6,13 @@ import os
 import re
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.storage.object_folder import TEMPORARY_MARK, ObjectFolder
+from bunraku.storage.object_folder import COPY_CHUNK_BYTES, TEMPORARY_MARK, ObjectFolder
 from bunraku.storage.object_storage import ObjectStorage
 from tests.processes import find_program
 
@@ -80,6 +81,18 @@ def test_new_contents_replace_the_old_only_when_complete(tmp_path: Path, monkeyp
     assert [entry.name for entry in (tmp_path / "objects" / "motions").iterdir()] == ["a"]
     folder.write("motions/a", b"new")
     assert folder.read("motions/a") == b"new"
+
+
+def test_file_is_copied_without_having_it_in_memory(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(os.urandom(10 * COPY_CHUNK_BYTES))
+    tracemalloc.start()
+    try:
+        ObjectFolder(tmp_path / "objects").write_file("sources/a", source)
+        assert tracemalloc.get_traced_memory()[1] < 5 * COPY_CHUNK_BYTES
+    finally:
+        tracemalloc.stop()
+    assert (tmp_path / "objects" / "sources" / "a").read_bytes() == source.read_bytes()
 
 
 @pytest.mark.parametrize("path", ["", "/etc/passwd", "../a", "a/../b", "a//b", "a/.", "a\0"])

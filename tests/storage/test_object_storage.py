@@ -59,6 +59,13 @@ async def test_object_exists_until_it_is_deleted(url: str, size: int) -> None:
     assert await reopened.get("some/object") is None
 
 
+async def test_file_is_stored_as_an_object(url: str, tmp_path: Path) -> None:
+    data, source = secrets.token_bytes(12_000_000), tmp_path / "source"
+    source.write_bytes(data)
+    await ObjectStorage(url).put_file("some/object", source)
+    assert await ObjectStorage(url).get("some/object") == data
+
+
 async def test_motion_store_stores_motions_and_logs(url: str) -> None:
     encoded = encode_motion(random_motion(1.5, 30.0, 8), error_bounds_mm=(30.0,), grade="live")
     await MotionStore.open(url).put("m1", pack_motion("m1", encoded))

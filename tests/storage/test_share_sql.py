@@ -7,7 +7,7 @@ import pytest
 
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.storage.catalogue_sql import SqlCatalogue
-from bunraku.storage.record import QuotaExceeded, Share
+from bunraku.storage.record import QuotaExceeded, Share, ShareScope
 
 
 def make_share(number: int, subject: str = "aiko", expires: int = 1_000) -> Share:
@@ -20,9 +20,9 @@ async def test_links_are_stored_listed_and_removed(url: str) -> None:
     for share in (make_share(1), make_share(2, "ben"), make_share(3)):
         await shares.add(share)
     assert await shares.get("s2") == make_share(2, "ben")
-    assert await shares.list(None, 10) == [make_share(3), make_share(2, "ben"), make_share(1)]
-    assert await shares.list("aiko", 10) == [make_share(3), make_share(1)]
-    assert await shares.list(None, 1) == [make_share(3)]
+    assert await shares.list(ShareScope(), 10) == [make_share(3), make_share(2, "ben"), make_share(1)]
+    assert await shares.list(ShareScope("aiko"), 10) == [make_share(3), make_share(1)]
+    assert await shares.list(ShareScope(), 1) == [make_share(3)]
     assert await shares.remove("s3")
     assert not await shares.remove("s3")
     assert await shares.get("s3") is None
@@ -37,7 +37,7 @@ async def test_adding_a_link_removes_expired_ones(url: str) -> None:
     assert await catalogue.shares.get("s1") is not None
     await catalogue.shares.add(make_share(60))
     assert await catalogue.shares.get("s1") is None
-    assert len(await catalogue.shares.list(None, 10)) == 2
+    assert len(await catalogue.shares.list(ShareScope(), 10)) == 2
     await catalogue.close()
 
 
@@ -57,7 +57,7 @@ async def test_links_beyond_the_quota_of_their_subject_are_not_added(url: str) -
     await shares.remove("s2")
     await shares.add(make_share(52), 2)
     await shares.add(make_share(53))
-    assert [share.id for share in await shares.list("aiko", 10)] == ["s53", "s52", "s50"]
+    assert [share.id for share in await shares.list(ShareScope("aiko"), 10)] == ["s53", "s52", "s50"]
     await catalogue.close()
 
 
@@ -73,6 +73,6 @@ async def test_concurrent_links_of_several_replicas_do_not_exceed_the_quota(url:
                     return
 
     await asyncio.gather(*map(add, range(30)))
-    assert len(await replicas[0].shares.list("aiko", 50)) == 5
+    assert len(await replicas[0].shares.list(ShareScope("aiko"), 50)) == 5
     for catalogue in replicas:
         await catalogue.close()

@@ -12,7 +12,7 @@ import pytest
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.motion_store import MotionStore
-from bunraku.storage.record import CatalogueEntry, Job, Share
+from bunraku.storage.record import CatalogueEntry, Job, Share, ShareScope
 from bunraku.storage.removal import remove_motion
 from bunraku.storage.space_reserve import MIN_RESERVE_BYTES, RESERVE_BYTES, SpaceReserve
 from tests.disks import fill_disk, mount_small_disk, use_up_inodes
@@ -52,10 +52,10 @@ async def test_links_can_be_removed_again_and_again_on_a_full_disk(disk: Path) -
         assert await catalogue.remove_share(share(number).id)
         # nobody else can use the space meanwhile
         assert allocated_bytes(reserve) >= MIN_RESERVE_BYTES
-    assert await catalogue.list_shares(None, 50) == []
+    assert await catalogue.list_shares(ShareScope(), 50) == []
     await catalogue.close()
     reopened = Catalogue(f"sqlite:///{disk}/catalogue.sqlite")
-    assert await reopened.list_shares(None, 50) == []
+    assert await reopened.list_shares(ShareScope(), 50) == []
     await reopened.close()
 
 

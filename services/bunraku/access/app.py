@@ -8,7 +8,7 @@ from fastapi import FastAPI, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from bunraku.http.access_control import Role, access_of, requires
+from bunraku.http.access_control import Access, Role, access_of, requires
 from bunraku.http.access_token import MAX_SHARE_LIFETIME_S
 from bunraku.http.admission import network_of
 from bunraku.http.problem_details import install_problem_handlers, motion_not_found, session_not_found
@@ -17,7 +17,7 @@ from bunraku.http.timestamp import format_timestamp
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
-from bunraku.storage.record import Share
+from bunraku.storage.record import Share, ShareScope
 
 DEFAULT_SHARE_LIFETIME_S = 7 * 86_400
 NO_STORE = {"Cache-Control": "no-store"}
@@ -108,10 +108,12 @@ def create_app(context: ServiceContext) -> FastAPI:
     async def page(
         request: Request, response: Response, limit: Annotated[int, Query(ge=1, le=200)] = 50
     ) -> dict[str, Any]:
-        """List the newest links of the client; with the role admin, those of all clients."""
+        """List the newest links of the client; with the role admin, those of all clients.
+
+        A client that is bound to a session or motion sees the links to that one only.
+        """
         response.headers.update(NO_STORE)
-        access = access_of(request)
-        shares = await catalogue.list_shares(None if access.role is Role.ADMIN else access.subject, limit)
+        shares = await catalogue.list_shares(share_scope(access_of(request)), limit)
         return {"items": [share_to_json(one) for one in shares]}
 
     @app.delete("/v1/shares/{share}", status_code=204, tags=["access"])
@@ -121,17 +123,21 @@ def create_app(context: ServiceContext) -> FastAPI:
 
         With 503 and 507 the link grants nothing any more, but its removal is not stored yet.
         """
-        access = access_of(request)
+        scope = share_scope(access_of(request))
         try:
             existing = await catalogue.get_share(share)
         except BackendUnavailable as error:
-            subject = None if access.role is Role.ADMIN else access.subject
-            raise authenticator.revocations.revoke_unverified(share, subject, error) from error
-        if existing is None or (access.role is not Role.ADMIN and existing.subject != access.subject):
+            raise authenticator.revocations.revoke_unverified(share, scope, error) from error
+        if existing is None or not scope.includes(existing):
             raise ProblemError(404, "No such link", f"there is no link {share!r}")
         await authenticator.revocations.revoke(share)
 
     return app
+
+
+def share_scope(access: Access) -> ShareScope:
+    """Return the links that a client may list and revoke."""
+    return ShareScope() if access.role is Role.ADMIN else ShareScope(access.subject, access.session, access.motion)
 
 
 def share_to_json(share: Share) -> dict[str, Any]:

@@ -10,21 +10,30 @@ import logging
 import re
 from collections import Counter
 from collections.abc import Iterable
+from contextlib import ExitStack
 from typing import Any, NamedTuple
 from urllib.parse import parse_qsl
 
 from fastapi import FastAPI
 from fastapi.routing import APIRoute
 from starlette.datastructures import Headers
+from starlette.requests import HTTPConnection
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.types import ASGIApp, Receive, Scope, Send
 from starlette.websockets import WebSocket
 
 from bunraku.http.access_control import ACCESS_SCOPE_KEY, Access, Requirement, Role, requirement_of
 from bunraku.http.access_log import API_PREFIX, ROUTE_SCOPE_KEY
+from bunraku.http.admission import AdmissionLimit, holder_of
 from bunraku.http.authentication import unauthorized
 from bunraku.http.origin import is_allowed_origin, is_local_host, parse_origins
-from bunraku.http.problem_details import motion_not_found, problem_response, session_not_found, unavailable_response
+from bunraku.http.problem_details import (
+    RETRY_AFTER_S,
+    motion_not_found,
+    problem_response,
+    session_not_found,
+    unavailable_response,
+)
 from bunraku.http.request_body import limit_body, too_large_detail
 from bunraku.http.response_headers import mark_cache_private
 from bunraku.http.token_bucket import KeyedTokenBuckets
@@ -44,6 +53,10 @@ CONNECT_BURST_S = 10
 """An address may open as many connections at once as the rate limit allows in this time, in seconds."""
 CHANGES_PER_S, CHANGE_BURST = 20.0, 200
 """Rate of the requests of one subject that create or edit something, at one process, and their number at once."""
+MAX_REQUESTS_WITH_BODY = 1_000
+"""Requests with a body that are received or processed at the same time; further ones get 503. Each needs 40 kB."""
+MAX_REQUESTS_WITH_BODY_PER_HOLDER = 64
+"""Requests with a body of one subject, or one address without a subject, at the same time."""
 _LINK_NEEDED = "A link is needed"
 
 _log = logging.getLogger(__name__)
@@ -124,6 +137,7 @@ class AuthorizationMiddleware:
         settings = context.settings
         self._allowed_origins = parse_origins(settings.origins)
         self._body_timeout_s = settings.body_seconds
+        self._bodies = AdmissionLimit("requests with a body", MAX_REQUESTS_WITH_BODY, MAX_REQUESTS_WITH_BODY_PER_HOLDER)
         limited = self._authenticator.requires_token and settings.connects > 0
         self._connect_buckets = (
             KeyedTokenBuckets(settings.connects, settings.connects * CONNECT_BURST_S) if limited else None
@@ -139,14 +153,18 @@ class AuthorizationMiddleware:
             await self._app(scope, receive, send)
 
     async def _handle_request(self, scope: Scope, receive: Receive, send: Send) -> None:
-        try:
-            requirement = await self._authorize_request(scope)
-        except ProblemError as problem:
-            self._record_rejection(scope, problem)
-            await problem_response(problem, _problem_headers(problem))(scope, receive, send)
-        except BackendUnavailable as error:
-            await unavailable_response(error)(scope, receive, send)
-        else:
+        with ExitStack() as stack:
+            try:
+                requirement = await self._authorize_request(scope)
+                if _has_body(Headers(scope=scope)):
+                    stack.enter_context(self._bodies.admit(holder_of(HTTPConnection(scope))))
+            except ProblemError as problem:
+                self._record_rejection(scope, problem)
+                await problem_response(problem, _problem_headers(problem))(scope, receive, send)
+                return
+            except BackendUnavailable as error:
+                await unavailable_response(error)(scope, receive, send)
+                return
             limit = requirement.max_body_bytes
             limited_receive = limit_body(receive, limit, self._body_timeout_s, self._monotonic_seconds)
             is_private = requirement.role is not None and self._authenticator.requires_token
@@ -328,6 +346,10 @@ _CLOSE_CODES = {
 }
 
 
+def _has_body(headers: Headers) -> bool:
+    return "transfer-encoding" in headers or headers.get("content-length", "0").strip("0") != ""
+
+
 def _problem_headers(problem: ProblemError) -> dict[str, str]:
     """Return the response headers for a problem (RFC 6750, section 3; RFC 9110, section 10.2.3)."""
     if problem.status == 401:
@@ -338,4 +360,6 @@ def _problem_headers(problem: ProblemError) -> dict[str, str]:
         return {"WWW-Authenticate": f'Bearer realm="bunraku", error="insufficient_scope", scope="{scope}"'}
     if problem.status == 413:
         return {"Connection": "close"}
+    if problem.status == 503:
+        return {"Retry-After": str(RETRY_AFTER_S)}
     return {"Retry-After": "1"} if problem.status == 429 else {}

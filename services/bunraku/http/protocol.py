@@ -202,7 +202,7 @@ class HttpProtocol(H11Protocol):
         headers = [("content-type", MEDIA_TYPE), ("content-length", str(len(body))), ("connection", "close")]
         events = (
             h11.Response(status_code=status, headers=headers, reason=status.phrase.encode()),
-            h11.Data(data=body),
+            h11.Data(data=b"" if self.conn.is_head_request else body),
             h11.EndOfMessage(),
         )
         return b"".join(self.conn.send(event) or b"" for event in events)

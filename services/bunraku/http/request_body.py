@@ -24,21 +24,22 @@ def too_large_detail(max_bytes: int) -> str:
 def limit_body(receive: Receive, max_bytes: int | None, window_s: float, clock: Callable[[], float]) -> Receive:
     """Return `receive` with limits on the request body. `clock` returns seconds.
 
-    It raises HTTPException 413 as soon as the body has more than `max_bytes` bytes. It raises HTTPException 408 at the
-    end of a window of `window_s` seconds in which neither the body ended nor `MIN_BODY_BYTES_PER_S` arrived.
+    It raises HTTPException 413 as soon as the body has more than `max_bytes` bytes. It raises HTTPException 408 when a
+    window of `window_s` seconds is over, in which the body neither ended nor brought `MIN_BODY_BYTES_PER_S` on average.
+    A window ends early when it has brought as much, so that fast data before a pause buys no time.
     """
     # FastAPI passes on only HTTPException from `receive`, so these errors are no `ProblemError`
     window_end, window_bytes, size, is_complete = clock() + window_s, 0, 0, False
 
     def check_progress() -> None:
-        """Begin the next window if this one is over; raise HTTPException 408 if too little arrived in it."""
+        """Begin the next window if enough arrived in this one; raise HTTPException 408 if it is over without that."""
         nonlocal window_end, window_bytes
-        if (now := clock()) < window_end:
-            return
-        if window_bytes < MIN_BODY_BYTES_PER_S * window_s:
+        now = clock()
+        if window_bytes >= MIN_BODY_BYTES_PER_S * window_s:
+            window_end, window_bytes = now + window_s, 0
+        elif now >= window_end:
             detail = f"the request body arrived too slowly: {window_bytes} bytes in {window_s:g} s"
             raise HTTPException(408, detail, {"Connection": "close"})
-        window_end, window_bytes = now + window_s, 0
 
     async def receive_limited() -> Message:
         nonlocal size, window_bytes, is_complete

@@ -29,6 +29,8 @@ class BoundedConnection(h11.Connection):
     def __init__(self) -> None:
         super().__init__(h11.SERVER, MAX_HEAD_BYTES)
         self.error: h11.RemoteProtocolError | None = None
+        self.is_head_request = False
+        """True if the response to the present request has no body (RFC 9110, section 9.3.2)."""
         self._received_bytes = self._body_bytes = 0
         self._chunk_limit = ChunkLimit()
 
@@ -47,6 +49,7 @@ class BoundedConnection(h11.Connection):
             if isinstance(event, h11.Request):
                 self._received_bytes = self._body_bytes = 0
                 self._chunk_limit = ChunkLimit()
+                self.is_head_request = event.method == b"HEAD"
                 check_request_head(event)
                 if _is_websocket_upgrade(event) and self.trailing_data[0]:
                     _reject("data follows a WebSocket handshake before its response", 400)
@@ -54,6 +57,10 @@ class BoundedConnection(h11.Connection):
             self.error = error
             raise
         return event
+
+    def start_next_cycle(self) -> None:
+        super().start_next_cycle()
+        self.is_head_request = False
 
     def _check_framing(self) -> None:
         """Reject chunk extensions and trailers without end (RFC 9112, section 7.1.1)."""

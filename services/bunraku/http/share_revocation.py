@@ -17,6 +17,7 @@ from bunraku.messaging.bus import Bus
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.catalogue import Catalogue
+from bunraku.storage.record import ShareScope
 
 SHARE_REVOKED_SUBJECT = "shares.revoked"
 """Bus subject of revoked links. A message is the id of a link."""
@@ -43,7 +44,7 @@ class ShareRevocations:
         self._close_connections = close_connections
         self._remembered: OrderedDict[str, None] = OrderedDict()
         self._pending: set[str] = set()
-        self._unverified: dict[str, str | None] = {}
+        self._unverified: dict[str, ShareScope] = {}
         self._retry_task: asyncio.Task[None] | None = None
         self._subscription = bus.subscribe(SHARE_REVOKED_SUBJECT, self._on_revoked)
 
@@ -68,14 +69,14 @@ class ShareRevocations:
         self._pending.discard(share_id)
         return existed
 
-    def revoke_unverified(self, share_id: str, subject: str | None, error: BackendUnavailable) -> ProblemError:
+    def revoke_unverified(self, share_id: str, scope: ShareScope, error: BackendUnavailable) -> ProblemError:
         """Revoke a link that cannot be looked up now, once it can be, and return the problem to answer.
 
-        It is revoked only if it is a link of `subject`; None is any. Until then no replica can look it up either, so
-        that it grants nothing.
+        It is revoked only if it is a link of `scope`. Until then no replica can look it up either, so that it grants
+        nothing.
         """
         if len(self._unverified) < MAX_UNVERIFIED_REVOCATIONS:
-            self._unverified[share_id] = subject
+            self._unverified[share_id] = scope
             self._start_retrying()
         return _not_stored_problem(share_id, error)
 
@@ -107,9 +108,9 @@ class ShareRevocations:
         while self._pending or self._unverified:
             await asyncio.sleep(RETRY_INTERVAL_S)
             try:
-                for share_id, subject in tuple(self._unverified.items()):
+                for share_id, scope in tuple(self._unverified.items()):
                     share = await self._catalogue.get_share(share_id)
-                    if share is not None and subject in (None, share.subject):
+                    if share is not None and scope.includes(share):
                         self._refuse(share_id)
                     del self._unverified[share_id]
                 for share_id in tuple(self._pending):

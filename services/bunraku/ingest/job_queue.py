@@ -86,8 +86,6 @@ class JobQueue:
         # own jobs that nothing ran at the last search
         self._left_jobs: set[str] = set()
         self._hold_observer = HeartbeatObserver(timing.lease_us * 1e-6)
-        # one file at a time is in memory
-        self._storing = asyncio.Semaphore(1)
         self._resumed_tasks: set[asyncio.Task[None]] = set()
         self.resumed_jobs = 0
         """Number of abandoned jobs that this replica has resumed."""
@@ -104,8 +102,7 @@ class JobQueue:
         Raise `BackendUnavailable`, or `ProblemError` (507) without storage space.
         """
         motion_store, catalogue = self._context.motion_store, self._context.catalogue
-        async with self._storing:
-            await motion_store.put_source(job.id, await asyncio.to_thread(path.read_bytes))
+        await motion_store.put_source(job.id, path)
         self._held_jobs.add(job.id)
         try:
             now = self._context.clock()

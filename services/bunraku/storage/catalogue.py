@@ -7,7 +7,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from bunraku.storage.postgres_url import split_tls_options
-from bunraku.storage.record import CatalogueEntry, Job, JobHold, Quota, Share
+from bunraku.storage.record import CatalogueEntry, Job, JobHold, Quota, Share, ShareScope
 
 if TYPE_CHECKING:
     from bunraku.storage.catalogue_sql import MotionKey, SqlCatalogue
@@ -137,9 +137,9 @@ class Catalogue:
         """Return a viewer link, None if it was revoked."""
         return await (await self.open()).shares.get(share_id)
 
-    async def list_shares(self, subject: str | None, limit: int) -> list[Share]:
-        """Return at most `limit` viewer links, newest first, of one subject or (None) of all."""
-        return await (await self.open()).shares.list(subject, limit)
+    async def list_shares(self, scope: ShareScope, limit: int) -> list[Share]:
+        """Return at most `limit` viewer links of a scope, newest first."""
+        return await (await self.open()).shares.list(scope, limit)
 
     async def remove_share(self, share_id: str) -> bool:
         """Revoke a viewer link and return whether it existed."""

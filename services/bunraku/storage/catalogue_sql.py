@@ -22,7 +22,7 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.storage.engine import create_engine
 from bunraku.storage.job_sql import SqlJobTable
 from bunraku.storage.migration import HEAD_REVISION, migrate, read_schema_version
-from bunraku.storage.record import CatalogueEntry, InvalidCursor, Quota, QuotaExceeded
+from bunraku.storage.record import CatalogueEntry, InvalidCursor, Quota, QuotaExceeded, is_motion_id
 from bunraku.storage.share_sql import SqlShareTable
 from bunraku.storage.space_reserve import SpaceReserve
 from bunraku.storage.table import JOBS, MOTIONS
@@ -116,7 +116,7 @@ class SqlCatalogue:
 
     async def get_motion(self, motion_id: str) -> CatalogueEntry | None:
         """Return a motion, None if it does not exist."""
-        return await self._run_query(self._select_motion(motion_id)) if _is_motion_id(motion_id) else None
+        return await self._run_query(self._select_motion(motion_id)) if is_motion_id(motion_id) else None
 
     async def list_motions(self, limit: int, cursor: str | None = None) -> tuple[list[CatalogueEntry], str | None]:
         """Return at most `limit` motions, newest first, and the next page's cursor; raise `InvalidCursor`."""
@@ -124,7 +124,7 @@ class SqlCatalogue:
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""
-        return _is_motion_id(motion_id) and await self._run_removal(lambda: self._delete_motion(motion_id))
+        return is_motion_id(motion_id) and await self._run_removal(lambda: self._delete_motion(motion_id))
 
     async def list_motion_keys(self, limit: int, after: str = "") -> list[MotionKey]:
         """Return at most `limit` rows with ids greater than `after`, by id."""
@@ -257,11 +257,6 @@ def _is_outage(error: DBAPIError) -> bool:
     return not str(getattr(error.orig, "sqlstate", "")).startswith(_CALLER_SQLSTATES)
 
 
-def _is_motion_id(text_id: str) -> bool:
-    # databases differ in the text that they accept
-    return text_id.isascii() and text_id.isalnum()
-
-
 def _entry_from_row(row: Row[Any]) -> CatalogueEntry:
     # rows from before quotas have neither subject nor size
     return CatalogueEntry(row.id, row.created, json.loads(row.description), row.subject or "", row.bytes or 0)
@@ -287,7 +282,7 @@ async def _enforce_quota(connection: AsyncConnection, subject: str, quota: Quota
 def _parse_cursor(cursor: str) -> tuple[int, str]:
     try:
         created, motion = base64.urlsafe_b64decode(cursor.encode()).decode().split(":", 1)
-        if not _is_motion_id(motion):
+        if not is_motion_id(motion):
             raise ValueError(motion)
         return min(max(int(created), 0), (1 << 63) - 1), motion
     except (ValueError, binascii.Error):

@@ -9,11 +9,13 @@ import logging
 import re
 from collections import OrderedDict
 from collections.abc import AsyncIterator
+from pathlib import Path
 
 from bunraku.codec.container import StoredMotion, unpack_motion
 from bunraku.codec.errors import DamagedBlock
 from bunraku.storage.object_folder import StoredObject
 from bunraku.storage.object_storage import ObjectStorage
+from bunraku.storage.record import is_motion_id
 
 MAX_CACHE_BYTES = 64 << 20
 OBJECT_FOLDERS = ("motions", "sources", "logs", "notes")
@@ -46,7 +48,7 @@ class MotionStore:
     async def get(self, motion_id: str) -> StoredMotion | None:
         """Return a motion, None if it does not exist, is damaged or is in an unsupported codec."""
         # never use a string as a path that cannot be an id
-        if not (motion_id.isascii() and motion_id.isalnum()):
+        if not is_motion_id(motion_id):
             return None
         if motion_id in self._cache:
             self._cache.move_to_end(motion_id)
@@ -83,9 +85,9 @@ class MotionStore:
         """Return a note, None if it does not exist."""
         return await self._objects.get(f"notes/{name}")
 
-    async def put_source(self, name: str, data: bytes) -> None:
+    async def put_source(self, name: str, source: Path) -> None:
         """Store an uploaded file; `name` is derived from its hash, one word."""
-        await self._objects.put(f"sources/{name}", data)
+        await self._objects.put_file(f"sources/{name}", source)
 
     async def get_source(self, name: str) -> bytes | None:
         """Return an uploaded file, None if it does not exist."""

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import io
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 TEMPORARY_MARK = "#"
 """Character in the names of files that are being written; no object has it in its name."""
 LIST_CHUNK = 500
 """Number of objects in one chunk of a listing."""
+
+COPY_CHUNK_BYTES = 1 << 20
 
 
 class StoredObject(NamedTuple):
@@ -43,7 +47,16 @@ class ObjectFolder:
         return f"the folder {self._root}"
 
     def write(self, path: str, data: bytes) -> None:
-        """Store an object durably; the previous object of this path stays until then.
+        """Store an object durably; the previous object of this path stays until then."""
+        self._write(path, io.BytesIO(data))
+
+    def write_file(self, path: str, source: Path) -> None:
+        """Store the contents of a file as `write` does, without having all of it in memory."""
+        with source.open("rb") as contents:
+            self._write(path, contents)
+
+    def _write(self, path: str, contents: BinaryIO) -> None:
+        """Store an object durably.
 
         The order is that of a write that survives a power loss at any point: contents to the disk, name of the
         temporary file to the final name, folder to the disk.
@@ -53,7 +66,7 @@ class ObjectFolder:
         temporary = target.with_name(f"{target.name}{TEMPORARY_MARK}{secrets.token_hex(8)}")
         try:
             with temporary.open("xb") as file:
-                file.write(data)
+                shutil.copyfileobj(contents, file, COPY_CHUNK_BYTES)
                 file.flush()
                 os.fsync(file.fileno())
             temporary.replace(target)

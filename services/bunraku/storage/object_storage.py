@@ -57,9 +57,19 @@ class ObjectStorage:
         """
         if self._folder is not None:
             await self._run_in_folder(lambda folder: folder.write(path, data))
-            return
+        else:
+            await self._put_remotely(path, data, len(data))
+
+    async def put_file(self, path: str, source: Path) -> None:
+        """Store the contents of a file as `put` does, without having all of it in memory."""
+        if self._folder is not None:
+            await self._run_in_folder(lambda folder: folder.write_file(path, source))
+        else:
+            await self._put_remotely(path, source, (await asyncio.to_thread(source.stat)).st_size)
+
+    async def _put_remotely(self, path: str, contents: bytes | Path, size: int) -> None:
         try:
-            await self._run_request(obstore.put_async(self._store, path, data), len(data))
+            await self._run_request(obstore.put_async(self._store, path, contents), size)
         except FileNotFoundError as error:
             raise BackendUnavailable("the library", _error_detail(error)) from error
 

@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any, NamedTuple
+
+_MOTION_ID_PATTERN = re.compile(r"[A-Za-z0-9]{1,64}")
+
+
+def is_motion_id(text: str) -> bool:
+    """Return whether a text of a client may be the id of a motion. Databases and file systems reject others."""
+    return _MOTION_ID_PATTERN.fullmatch(text) is not None
 
 
 class InvalidCursor(ValueError):
@@ -49,6 +57,19 @@ class Share:
     subject: str
     session: str | None = None
     motion: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ShareScope:
+    """Viewer links that a client may list and revoke: those with these values, of which None is any."""
+
+    subject: str | None = None
+    session: str | None = None
+    motion: str | None = None
+
+    def includes(self, share: Share) -> bool:
+        """Return whether a link is one of them."""
+        return all(getattr(self, name) in (None, getattr(share, name)) for name in ("subject", "session", "motion"))
 
 
 class JobHold(NamedTuple):

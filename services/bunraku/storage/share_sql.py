@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import builtins
+from dataclasses import asdict
 from typing import Any
 
 from sqlalchemy import Row, delete, func, select, text
 from sqlalchemy.ext.asyncio import AsyncEngine
 
-from bunraku.storage.record import QuotaExceeded, Share
+from bunraku.storage.record import QuotaExceeded, Share, ShareScope
 from bunraku.storage.table import SHARES, QueryRunner, RemovalRunner
 
 _QUOTA_LOCK_ID = 0x6C696E6B73
@@ -32,11 +33,12 @@ class SqlShareTable:
         rows = await self._run_query(self._select(select(SHARES).where(SHARES.c.id == share_id)))
         return rows[0] if rows else None
 
-    async def list(self, subject: str | None, limit: int) -> builtins.list[Share]:
-        """Return the newest links of one subject or of all."""
+    async def list(self, scope: ShareScope, limit: int) -> builtins.list[Share]:
+        """Return the newest links of a scope."""
         statement = select(SHARES).order_by(SHARES.c.created.desc(), SHARES.c.id.desc()).limit(limit)
-        if subject is not None:
-            statement = statement.where(SHARES.c.subject == subject)
+        for name, value in asdict(scope).items():
+            if value is not None:
+                statement = statement.where(SHARES.c[name] == value)
         return await self._run_query(self._select(statement))
 
     async def remove(self, share_id: str) -> bool:

@@ -125,6 +125,7 @@ def test_unreadable_file_is_rejected_with_the_reason(tmp_path: Path) -> None:
         "a slow rate": (make_wav(bytes(1800), 1800, rate=4_000), "Unusual rate", "4000"),
         "a fast rate": (make_wav(bytes(1800), 1800, rate=1_000_000), "Unusual rate", "1000000"),
         "an old codec": (make_wav(bytes(1800), 1800, code=0x11, bits=4), "Unreadable sound", "adpcm"),
+        "an unknown codec": (make_wav(bytes(1800), 1800, code=0x5555), "Unreadable sound", "unknown codec"),
         "not a number": (make_wav(bytes(400) + nan + bytes(400), 804, code=3, bits=32), "Not a number", "near 0.0 s"),
     }
     for name, (data, title, message) in cases.items():

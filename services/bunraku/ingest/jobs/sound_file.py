@@ -112,6 +112,8 @@ class SoundFile:
             raise UnreadableSound("No sound", f"this {container_format.upper()} file has no audio stream")
         stream = self._container.streams.audio[0]
         context = stream.codec_context
+        if context is None or context.codec is None:
+            raise UnreadableSound("Unreadable sound", f"this {container_format.upper()} file has an unknown codec")
         if not (context.name in SUPPORTED_CODECS or context.name.startswith("pcm_")):
             raise UnreadableSound("Unreadable sound", f"the codec {context.name} is not supported")
         if not 1 <= context.channels <= MAX_CHANNELS:
