@@ -201,7 +201,7 @@ class Operations:
         path.write_bytes(source)
         job = create_motion_job(digest, "clip.bvh", "")
         motion = self._model.motions.setdefault(motion_id, MotionModel())
-        removals = motion.removals
+        removals = motion.removals - motion.running_removals
         stored = await self._call(
             f"upload {motion_id}", replica, lambda: replica.jobs.run_job(job, path, UploadProgress()), self._world.note
         )
@@ -215,6 +215,7 @@ class Operations:
             return
         motion, context = self._model.motions[motion_id], replica.context
         motion.removals += 1
+        motion.running_removals += 1
         motion.is_promised = False
 
         async def remove() -> bool:
@@ -222,6 +223,7 @@ class Operations:
             return True
 
         await self._call(f"remove {motion_id}", replica, remove, self._world.note)
+        motion.running_removals -= 1
 
     async def record(self) -> None:
         """Record a session as a motion."""
