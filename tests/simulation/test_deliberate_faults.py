@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import TypeVar
 from unittest.mock import patch
 
 import pytest
@@ -23,7 +22,6 @@ from tests.simulation.simulation import simulate
 from tests.simulation.storage import NodeObjects
 
 TRACED_SEEDS = range(3)
-Result = TypeVar("Result")
 MAX_SEEDS_PER_FAULT = 200
 """Number of seeds within which a deliberate fault must be found."""
 
@@ -44,12 +42,6 @@ def _keep_timeline(self: Stage, state: TimelineState) -> None:
 
 
 async def _do_nothing(*_: object) -> None: ...
-
-
-async def _write_without_revision(
-    _self: SessionRegistry, _session: str, _revision: int, write: Callable[[None], Awaitable[Result]]
-) -> Result:
-    return await write(None)
 
 
 async def _claim_without_revision(
@@ -73,11 +65,8 @@ MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
     "a take-over ignores the revision of the record": lambda: patch.object(
         SessionRegistry, "claim", _claim_without_revision
     ),
-    "an owner ignores the revision of its record": lambda: patch.object(
-        SessionRegistry, "_decide", _write_without_revision
-    ),
     "the state of a watched session is requested only once": lambda: patch.object(
-        WatchedSession, "resynchronise", lambda _: None
+        WatchedSession, "resynchronise", _do_nothing
     ),
     "an owner does not publish its state again": lambda: patch.object(Stage, "announce", lambda _: None),
     "the record of an ended session stays": lambda: patch.object(SessionRegistry, "remove", _do_nothing),
