@@ -312,3 +312,51 @@ async def test_random_faults_leave_one_stage_for_each_record(
     assert sorted(session for replica in living for session in replica.stages) == sorted(expected)
     for session in expected:
         assert (await living[0].sessions.stage_proxy(session).describe())["id"] == session
+
+
+async def test_owner_publishes_state_after_reconnection(
+    context: ServiceContext, start: Callable[[], Replica], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reconnected: list[Callable[[], None]] = []
+    monkeypatch.setattr(context.bus, "on_reconnect", reconnected.append)
+    owner = start()
+    session = (await owner.sessions.open_session("one"))["id"]
+    published: list[bytes] = []
+    context.bus.subscribe(f"session.{session}.timeline", published.append)
+    monkeypatch.setattr(context.bus, "reconnects", 1)
+    reconnected[0]()
+    await wait_until(lambda: bool(published))
+    assert published == [owner.sessions._endpoints[session].stage.timeline.pack()]
+
+
+async def test_replica_that_lost_a_session_publishes_nothing_after_reconnection(
+    context: ServiceContext,
+    start: Callable[[], Replica],
+    server: MemoryKeyValueStore,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    reconnected: list[Callable[[], None]] = []
+    monkeypatch.setattr(context.bus, "on_reconnect", reconnected.append)
+    owner, other = start(), start()
+    sessions = [(await owner.sessions.open_session("one"))["id"] for _ in range(2)]
+    lost, kept = sessions
+    await other.send_heartbeats(2)
+    # the other replica has written the record and has no stage yet
+    other.store.held_calls["put sessions"] = asyncio.Event()
+    owner.store.watch_released.clear()
+    stage = owner.sessions._endpoints[lost].stage
+    record = SessionRecord(other.id, stage.created, stage.timeline.pack())
+    await server.put(session_key(lost), record.pack())
+    published: list[str] = []
+    for session in sessions:
+
+        def receive(_: bytes, session: str = session) -> None:
+            published.append(session)
+
+        context.bus.subscribe(f"session.{session}.timeline", receive)
+    monkeypatch.setattr(context.bus, "reconnects", 1)
+    reconnected[0]()
+    owner.store.watch_released.set()
+    await wait_until(lambda: bool(published))
+    assert published == [kept]
+    assert owner.stages == {kept}

@@ -404,7 +404,7 @@ async def test_limb_stays_held_during_a_server_stall(stage: Stage, bus: MemoryBu
 
 async def test_takeover_publishes_timeline_presence_and_an_empty_overlay(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
-    stage.announce_takeover()
+    stage.announce()
     state, presence, overlay = audience.messages
     assert state == stage.timeline
     assert isinstance(presence, Presence)

@@ -48,6 +48,8 @@ class Broker:
         self.store = MemoryKeyValueStore()
         self.loss = 0.0
         """Share of the messages to lossy subjects that get lost, and that arrive twice."""
+        self.max_answer_delay_us = 0
+        """Longest time for which an answer of the key-value store is late, after the operation was carried out."""
         self.on_publish: Callable[[BrokerClient, str, bytes], None] = lambda _client, _subject, _data: None
         """Observer of all published messages."""
         self._watches: dict[BrokerClient, Subscription] = {}
@@ -114,7 +116,11 @@ class Broker:
             result: object = run_at_once(operation())
         except Exception as error:
             result = error
-        self.route_response(client, token, result)
+        if self.max_answer_delay_us:
+            delay_us = self.random.randrange(self.max_answer_delay_us)
+            self.node.call_later(delay_us, self.route_response, client, token, result)
+        else:
+            self.route_response(client, token, result)
 
 
 def run_at_once(coroutine: Coroutine[Any, Any, T]) -> T:
@@ -149,10 +155,11 @@ class BrokerClient:
 
     # faults
 
-    def cut(self) -> None:
-        """Cut the connection; after the detection time both ends close it."""
+    def cut(self, up: bool = True, down: bool = True) -> None:
+        """Cut one or both directions of the connection; after the detection time both ends close it."""
         self._cut_count += 1
-        self.uplink.is_cut = self.downlink.is_cut = True
+        self.uplink.is_cut |= up
+        self.downlink.is_cut |= down
         self._broker.node.call_later(OUTAGE_DETECTION_US, self._on_outage_detected, self._cut_count)
 
     def heal(self) -> None:

@@ -8,6 +8,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 from contextvars import Context
+from itertools import count
 from random import Random
 from typing import Any
 
@@ -37,37 +38,28 @@ class VirtualEventLoop(asyncio.BaseEventLoop):
         """Function that is called after each iteration."""
         self._random = random
         super().__init__()
-        # attributes of the base class that its type does not declare
+        # an attribute of the base class that its type does not declare
         self._ready: deque[asyncio.Handle] = deque()
-        self._scheduled: list[asyncio.TimerHandle] = []
-        self._selector = self
-        self._clock_resolution = 0.5e-6
+        # by time in microseconds, then in order of scheduling; tuples are compared faster than handles
+        self._timers: list[tuple[int, int, asyncio.TimerHandle]] = []
+        self._timer_numbers = count()
         self.set_exception_handler(self._collect_exception)
 
     def time(self) -> float:
         return self.now_us * 1e-6
 
-    def select(self, timeout: float | None) -> list[Any]:
-        """Advance the clock by `timeout` seconds instead of waiting; raise `NothingScheduled` without one."""
-        if timeout is None:
-            raise NothingScheduled("no callback is ready and none is scheduled")
-        elapsed_us = math.ceil(timeout * 1e6 - 1e-3)
-        self.now_us += elapsed_us
-        self._steps_at_once = 0 if elapsed_us else self._steps_at_once + 1
-        if self._steps_at_once == MAX_STEPS_AT_ONCE:
-            self.unhandled.append(f"the event loop is busy for ever, with {self._scheduled[:1]}")
-        return []
+    def call_at(  # type: ignore[override]
+        self, when: float, callback: Callable[..., object], *args: Any, context: Context | None = None
+    ) -> asyncio.TimerHandle:
+        timer = asyncio.TimerHandle(when, callback, args, self, context)
+        heapq.heappush(self._timers, (math.ceil(when * 1e6 - 1e-3), next(self._timer_numbers), timer))
+        return timer
 
     def cancel_timers(self, belongs: Callable[[Context], bool]) -> None:
         """Drop the scheduled calls whose context `belongs` to a process that has died."""
-        kept = []
-        for timer in self._scheduled:
+        for _, _, timer in self._timers:
             if belongs(timer._context):  # type: ignore[attr-defined]
-                timer._cancelled, timer._scheduled = True, False  # type: ignore[attr-defined]
-            else:
-                kept.append(timer)
-        heapq.heapify(kept)
-        self._scheduled = kept
+                timer.cancel()
 
     def run_in_executor(self, _: Any, function: Callable[..., Any], *args: Any) -> asyncio.Future[Any]:  # type: ignore[override]
         future: asyncio.Future[Any] = self.create_future()
@@ -86,14 +78,30 @@ class VirtualEventLoop(asyncio.BaseEventLoop):
         self.call_later(self._random.randrange(1, MAX_THREAD_US) * 1e-6, run)
         return future
 
-    def _process_events(self, _events: list[Any]) -> None:
-        if len(self._ready) > 1:
-            ready = list(self._ready)
-            self._random.shuffle(ready)
-            self._ready = deque(ready)
-
     def _run_once(self) -> None:
-        super()._run_once()  # type: ignore[misc]
+        """Run what is ready, in random order; if nothing is, first advance the clock to the next timer."""
+        timers, ready = self._timers, self._ready
+        while timers and timers[0][2].cancelled():
+            heapq.heappop(timers)
+        self._steps_at_once += 1
+        if not ready:
+            if not timers:
+                raise NothingScheduled("no callback is ready and none is scheduled")
+            if timers[0][0] > self.now_us:
+                self.now_us, self._steps_at_once = timers[0][0], 0
+        while timers and timers[0][0] <= self.now_us:
+            ready.append(heapq.heappop(timers)[2])
+        if self._steps_at_once == MAX_STEPS_AT_ONCE:
+            self.unhandled.append(f"the event loop is busy for ever, with {timers[:1]}")
+        if len(ready) > 1:
+            handles = list(ready)
+            self._random.shuffle(handles)
+            ready.clear()
+            ready.extend(handles)
+        for _ in range(len(ready)):
+            handle = ready.popleft()
+            if not handle.cancelled():
+                handle._run()
         self.after_step()
 
     def _write_to_self(self) -> None:

@@ -14,7 +14,6 @@ from bunraku.playout.overlay_buffer import OverlayBuffer
 from bunraku.session.puppeteer_connection import MAX_QUEUED_MESSAGES, PuppeteerConnection
 from bunraku.session.stage import Stage
 from bunraku.storage.record import CatalogueEntry
-from bunraku.stream.quiet_period import MAX_QUIET_PERIOD_US
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS
 from bunraku.wire.messages import Data, unpack
 from bunraku.wire.overlay import Overlay
@@ -38,10 +37,6 @@ MAX_CLOCK_ERROR_US = 45_000
 POSE_TOLERANCE = 1e-9
 OVERLAY_TOLERANCE = 0.05
 """Difference of quaternions: a viewer on a constrained link interpolates between every second frame of an overlay."""
-
-
-class WrongPose(Violation):
-    """A viewer that shows another pose than its stage."""
 
 
 class Invariants:
@@ -116,8 +111,8 @@ class Invariants:
 
     # after the faults
 
-    async def check_end(self) -> None:
-        """Check what holds once all faults are over; raise `Violation`."""
+    async def check_end(self, converged_us: int) -> None:
+        """Check what holds once all faults are over, and what viewers show at `converged_us`; raise `Violation`."""
         stages = self._stages()
         for session in self._model.open_sessions():
             if session not in stages:
@@ -125,20 +120,24 @@ class Invariants:
         self._check_holders(stages)
         self._check_ended()
         await self._check_catalogue()
-        for viewer in self._model.viewers:
-            if viewer.session in stages and self._model.sessions[viewer.session] is SessionState.OPEN:
-                await self._check_viewer_within_quiet_period(viewer, stages[viewer.session])
+        viewers = [
+            viewer
+            for viewer in self._model.viewers
+            if viewer.session in stages and self._model.sessions[viewer.session] is SessionState.OPEN
+        ]
+        # a viewer is sent nothing during a quiet period
+        while viewers := [viewer for viewer in viewers if not self._has_converged(viewer, stages, converged_us)]:  # noqa: ASYNC110
+            await asyncio.sleep(POSE_CHECK_INTERVAL_US * 1e-6)
 
-    async def _check_viewer_within_quiet_period(self, viewer: SimulatedViewer, stage: Stage) -> None:
-        """Check a viewer, again after a quiet period: nothing is sent in it over a constrained link."""
-        for _ in range(MAX_QUIET_PERIOD_US // POSE_CHECK_INTERVAL_US):
-            try:
-                self._check_viewer(viewer, stage)
-            except WrongPose:
-                await asyncio.sleep(POSE_CHECK_INTERVAL_US * 1e-6)
-            else:
-                return
-        self._check_viewer(viewer, stage)
+    def _has_converged(self, viewer: SimulatedViewer, stages: dict[str, Stage], converged_us: int) -> bool:
+        """Return whether a viewer shows what its stage does; raise `Violation` if it does not at `converged_us`."""
+        try:
+            self._check_viewer(viewer, stages[viewer.session])
+        except Violation:
+            if self._world.loop.now_us >= converged_us:
+                raise
+            return False
+        return True
 
     def _stages(self) -> dict[str, Stage]:
         return {stage.id: stage for replica in self._world.sessions for stage in replica.sessions.stages}
@@ -192,7 +191,7 @@ class Invariants:
             raise Violation(f"{name} has no pose {POSE_AGE_US} us ago")
         difference = np.abs(pose[1] - expected[1]).max(axis=1)
         if np.abs(pose[0] - expected[0]).max() > POSE_TOLERANCE or difference.max() > OVERLAY_TOLERANCE:
-            raise WrongPose(
+            raise Violation(
                 f"{name} shows another pose than the stage; joints differ by {difference.round(3).tolist()}"
             )
 

@@ -24,9 +24,11 @@ class MotionModel:
     """Motion as its clients know it."""
 
     is_promised: bool = False
-    """True if an upload was acknowledged, and no removal was requested since its start."""
+    """True if an upload was acknowledged, and no removal has run since its start."""
     removals: int = 0
     """Number of removals requested so far."""
+    running_removals: int = 0
+    """Number of removals that are not answered: each may take effect at any time."""
 
 
 @dataclass

@@ -56,6 +56,7 @@ class Operations:
             (self.join_puppeteer, 3),
             (self.leave_puppeteer, 2),
             (self.act, 16),
+            (self.claim_together, 2),
             (self.upload, 4),
             (self.remove, 2),
             (self.record, 1),
@@ -71,7 +72,7 @@ class Operations:
 
     def start(self, operation: Callable[[], Coroutine[Any, Any, None]]) -> None:
         """Start an operation; it runs beside others."""
-        task = self._world.loop.create_task(operation(), name=f"operation {operation.__name__}")
+        task = self._world.loop.create_task(operation(), name="operation")
         self.running[task] = None
         task.add_done_callback(self.running.pop)
 
@@ -100,9 +101,10 @@ class Operations:
             self._model.sessions[opened["id"]] = SessionState.OPEN
             await self.join_viewer(opened["id"])
 
-    async def edit(self) -> None:
+    async def edit(self, session: str | None = None) -> None:
         """Seek, pause, play, loop or change the motion."""
-        session, replica = self._choose(self._model.open_sessions()), self._choose(self._world.sessions)
+        session = session or self._choose(self._model.open_sessions())
+        replica = self._choose(self._world.sessions)
         if session is None or replica is None:
             return
         random = self._random
@@ -121,9 +123,10 @@ class Operations:
             self._check_exists(session),
         )
 
-    async def end_session(self) -> None:
+    async def end_session(self, session: str | None = None) -> None:
         """End a session."""
-        session, replica = self._choose(self._model.open_sessions()), self._choose(self._world.sessions)
+        session = session or self._choose(self._model.open_sessions())
+        replica = self._choose(self._world.sessions)
         if session is None or replica is None or len(self._model.open_sessions()) < 2:
             return
         check = self._check_exists(session)
@@ -191,6 +194,16 @@ class Operations:
         else:
             puppeteer.is_moving = not puppeteer.is_moving
 
+    async def claim_together(self) -> None:
+        """Let all puppeteers claim one limb and release their others, which are handed over."""
+        limb = self._random.randrange(LIMB_COUNT)
+        self._world.note(f"all puppeteers claim {limb}")
+        for puppeteer in self._model.puppeteers:
+            for held in tuple(puppeteer.epochs):
+                puppeteer.release(held)
+            puppeteer.claim(limb)
+            puppeteer.ask(limb, True)
+
     async def upload(self) -> None:
         """Upload a file, perhaps one that was uploaded before."""
         replica, source = self._choose(self._world.ingests), self._random.choice(SOURCE_FILES)
@@ -201,7 +214,7 @@ class Operations:
         path.write_bytes(source)
         job = create_motion_job(digest, "clip.bvh", "")
         motion = self._model.motions.setdefault(motion_id, MotionModel())
-        removals = motion.removals
+        removals = motion.removals - motion.running_removals
         stored = await self._call(
             f"upload {motion_id}", replica, lambda: replica.jobs.run_job(job, path, UploadProgress()), self._world.note
         )
@@ -215,6 +228,7 @@ class Operations:
             return
         motion, context = self._model.motions[motion_id], replica.context
         motion.removals += 1
+        motion.running_removals += 1
         motion.is_promised = False
 
         async def remove() -> bool:
@@ -222,6 +236,7 @@ class Operations:
             return True
 
         await self._call(f"remove {motion_id}", replica, remove, self._world.note)
+        motion.running_removals -= 1
 
     async def record(self) -> None:
         """Record a session as a motion."""

@@ -35,6 +35,9 @@ async def control_session(replica: SessionReplica, transport: ServerTransport, s
             )
             await stage.join(connection, name)
             stack.callback(stage.send, connection, None)
+            if transport.is_closing():
+                # the client left during the handshake
+                return
             accepted = WebSocketConnection(
                 transport, connection, replica.connections, replica.context.clock, PUPPETEER_FRAMES
             )

@@ -78,7 +78,7 @@ class _Scenario:
         self._world = world
         self._model = Model()
         self._operations = Operations(world, self._model)
-        self._faults = Faults(world, self._model)
+        self._faults = Faults(world, self._model, self._operations)
         self._invariants = Invariants(world, self._model, self._faults)
         self._random = world.random("scenario")
 
@@ -112,8 +112,11 @@ class _Scenario:
         # most seeds recover without held limbs, which cost most of the time of a simulation
         if random.random() < 0.8:
             self._release_all()
-        await self._sleep(max(self._faults.over_us - self._world.loop.now_us, 0))
+        await self._wait_for_recovery()
+        await self._operations.finish()
+        await self._wait_for_recovery()
         self._world.note("all faults are over")
+        converged_us = self._world.loop.now_us + CONVERGENCE_US
         for puppeteer in self._model.puppeteers:
             puppeteer.is_moving = True
             puppeteer.claim(random.randrange(LIMB_COUNT))
@@ -121,9 +124,8 @@ class _Scenario:
         # a viewer on a constrained link is not sent every overlay of a limb that moves
         for puppeteer in self._model.puppeteers:
             puppeteer.is_moving = False
-        await self._sleep(CONVERGENCE_US * 3 // 4)
-        await self._operations.finish()
-        await self._invariants.check_end()
+        await self._sleep(CONVERGENCE_US // 2)
+        await self._invariants.check_end(converged_us)
         await self._check_claims()
         await self._stop()
 
@@ -139,6 +141,11 @@ class _Scenario:
             if world.loop.now_us >= next_fault:
                 self._faults.start_random()
                 next_fault = world.loop.now_us + self._interval(fault_us)
+
+    async def _wait_for_recovery(self) -> None:
+        """Wait until all faults and what they cause are over; one fault may cause another."""
+        while (remaining_us := self._faults.over_us - self._world.loop.now_us) > 0:
+            await self._sleep(remaining_us)
 
     def _release_all(self) -> None:
         for puppeteer in self._model.puppeteers:

@@ -30,7 +30,7 @@ class ServerTransport(asyncio.Transport):
         """Function of the client that receives what arrives."""
         self.on_lost: Callable[[], None] = lambda: None
         """Function of the client that is called when the connection ends."""
-        self._random = random
+        self.random = random
         self._server = server
         self._client = client
         self._protocol: Any = None
@@ -175,7 +175,7 @@ class ServerTransport(asyncio.Transport):
             self._is_lost = True
             if self._server.is_alive and self._protocol is not None:
                 # not in the order of a set, which differs from run to run
-                self._server.call_later(self._random.randrange(100), self._protocol.connection_lost, None)
+                self._server.call_later(self.random.randrange(100), self._protocol.connection_lost, None)
             self.downlink.send(lambda: self.on_lost())
 
     def _on_server_killed(self) -> None:

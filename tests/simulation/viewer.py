@@ -24,27 +24,32 @@ from tests.simulation.replica import StreamReplica
 from tests.simulation.transport import ServerTransport, encode_client_frame
 from tests.stream.fake_transport import parse_frames
 
+MAX_ACCEPT_US = 2_000
+"""Longest time in which a server accepts a WebSocket."""
+
 
 async def watch_session(
     replica: StreamReplica, transport: ServerTransport, session: str, query: dict[str, list[str]], is_measured: bool
 ) -> bool:
     """Serve a viewer as the stream service does; return False if there is no such session."""
+    accept_s = transport.random.randrange(MAX_ACCEPT_US) * 1e-6
     have = query.get("have", [""])[0]
     viewer = ViewerConnection(replica.stream, ViewerOptions(resume_state=ResumeState.parse(have) if have else None))
     try:
-        watched = await replica.watched.open(session)
+        async with replica.watched.open(session) as watched:
+            await asyncio.sleep(accept_s)
+            if transport.is_closing():
+                # the client left during the handshake
+                return True
+            connection = WebSocketConnection(transport, viewer, replica.connections, replica.context.clock)
+            replica.stream.counters.count_writes(connection)
+            watched.add_viewer(viewer)
+            viewer.open(connection, transport if is_measured else None)
+            connection.on_ended = replica.stream.counters.add_viewer(viewer, "session", lambda: None)
     except NoResponse:
         exists = await replica.context.key_values.get(f"{SESSION_KEY_PREFIX}.{session}") is not None
         transport.abort()
         return exists
-    try:
-        connection = WebSocketConnection(transport, viewer, replica.connections, replica.context.clock)
-        replica.stream.counters.count_writes(connection)
-        watched.add_viewer(viewer)
-        viewer.open(connection, transport if is_measured else None)
-        connection.on_ended = replica.stream.counters.add_viewer(viewer, "session", lambda: None)
-    finally:
-        replica.watched.close_if_empty(watched)
     return True
 
 

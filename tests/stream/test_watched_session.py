@@ -58,10 +58,17 @@ def serve_session_state(bus: MemoryBus, state: TimelineState = STATE) -> list[in
     return counts
 
 
+async def open_session(watched: WatchedSessions, session: str = "s") -> None:
+    """Open a session without adding a viewer."""
+    async with watched.open(session):
+        pass
+
+
 async def join_viewer(watched: WatchedSessions) -> tuple[ViewerConnection, FakeTransport]:
     viewer, transport = ViewerConnection(watched._context), FakeTransport()
-    (await watched.open("s")).add_viewer(viewer)
-    viewer.open(transport.open_connection(viewer))
+    async with watched.open("s") as session:
+        session.add_viewer(viewer)
+        viewer.open(transport.open_connection(viewer))
     return viewer, transport
 
 
@@ -222,7 +229,9 @@ async def test_invalid_session_id_is_not_requested(
 
     monkeypatch.setattr(bus, "request", request)
     with pytest.raises(NoResponse):
-        await WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock)).open(session)
+        await open_session(
+            WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock)), session
+        )
     assert requested == []
 
 
@@ -233,18 +242,20 @@ async def test_motion_change_reaches_all_viewers(motion_store: MotionStore) -> N
     joined = [await join_viewer(watched) for _ in range(2)]
     other = timeline.change_motion(STATE, 5_000, "n", 2_000_000)
     bus.publish("session.s.timeline", other.pack())
-    await (await watched.open("s")).wait_until_ready()
+    await open_session(watched)
     assert all(other in transport.messages for _, transport in joined)
     bus.publish("session.s.timeline", timeline.change_motion(other, 6_000, "gone", 2_000_000).pack())
     with pytest.raises(CloseConnection) as closed:
-        await watched.open("s")
+        await open_session(watched)
     assert closed.value.code == NOT_FOUND
     assert all(b"No such motion" in transport.sent for _, transport in joined)
 
 
 async def test_unknown_session_raises_no_response(motion_store: MotionStore) -> None:
     with pytest.raises(NoResponse):
-        await WatchedSessions(MemoryBus(), MemoryKeyValueStore(), motion_store, StreamContext.create(clock)).open("s")
+        await open_session(
+            WatchedSessions(MemoryBus(), MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+        )
 
 
 async def test_session_without_motion_is_rejected_and_closed(motion_store: MotionStore) -> None:
@@ -252,7 +263,7 @@ async def test_session_without_motion_is_rejected_and_closed(motion_store: Motio
     counts = serve_session_state(bus, timeline.start("none", 2_000_000, 1_000))
     watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     with pytest.raises(CloseConnection) as closed:
-        await watched.open("s")
+        await open_session(watched)
     assert closed.value.code == NOT_FOUND
     assert not watched._sessions
     assert counts == []
@@ -344,3 +355,16 @@ async def test_state_of_a_later_release_is_understood(motion_store: MotionStore)
     await asyncio.gather(*watched._resync_tasks)
     assert STATE in transport.messages
     await watched.close()
+
+
+async def test_viewer_that_leaves_early_keeps_the_session_open_for_another(motion_store: MotionStore) -> None:
+    bus = MemoryBus()
+    serve_session_state(bus)
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+    # both wait for the motion; the first is gone by then
+    _, (viewer, transport) = await asyncio.gather(open_session(watched), join_viewer(watched))
+    edited = timeline.edit(STATE, 2_000, playing=False)
+    bus.publish("session.s.timeline", edited.pack())
+    assert edited in transport.messages
+    viewer.on_close()
+    assert not watched._sessions

@@ -60,6 +60,8 @@ class SessionManager:
         self._changed_sessions: dict[str, None] = {}
         self._has_changes = asyncio.Event()
         self._registry.replicas.on_heartbeat(self._review_all)
+        self._reconnection = context.bus.on_reconnect(self._review_all)
+        self._announced_reconnects = context.bus.reconnects
         self.counters = SessionCounters()
         self._solver = PYTHON_SOLVER
 
@@ -203,6 +205,7 @@ class SessionManager:
                 with contextlib.suppress(SessionLost, BackendUnavailable):
                     await self._registry.save(session, _record_of(endpoint.stage), endpoint.revision)
                     self.counters.sessions["handed on",] += 1
+        self._reconnection.unsubscribe()
         self._registry.close()
         await self._registry.replicas.close()
 
@@ -275,13 +278,25 @@ class SessionManager:
         self._has_changes.set()
 
     async def _settle_changes(self) -> None:
-        """Close lost stages, claim abandoned sessions and end idle ones."""
+        """Close lost stages, claim abandoned sessions and end idle ones.
+
+        After a reconnection to the bus, publish the state of the remaining stages: messages of the outage are lost.
+        """
+        reconnects = self._context.bus.reconnects
+        if reconnects != self._announced_reconnects:
+            # first, as a stage that was taken over must publish nothing
+            await self._registry.synchronise()
+            self._review_all()
         changed, self._changed_sessions = self._changed_sessions, {}
         for session in changed:
             endpoint = self._endpoints.get(session)
             if endpoint is not None and self._registry.is_lost(session, endpoint.revision):
                 _log.warning("session %s has ended or belongs to another server now", session)
                 await self._close_stage(session)
+        if reconnects != self._announced_reconnects:
+            self._announced_reconnects = reconnects
+            for stage in self.stages:
+                stage.announce()
         for session in changed:
             if self._is_abandoned(session):
                 self._start_claim(session)
@@ -336,7 +351,7 @@ class SessionManager:
         if confirmed is None:
             return
         start = SessionStart(session, stored, state, claimed.record.created_us, claimed.record.subject)
-        (await self._add_stage(start, confirmed.revision)).announce_takeover()
+        (await self._add_stage(start, confirmed.revision)).announce()
         self.counters.sessions["taken over",] += 1
         _log.warning("session %s taken over from another server", session)
 

@@ -1,8 +1,9 @@
 """One session: timeline, puppeteers, and the overlay of their limbs (paper 5).
 
 The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), and `appear`
-when it takes over a session of another replica. It subscribes to `viewers` and responds to `state`. Overlays are
-computed for the time when they are due, `OVERLAY_LEAD_US` ahead of now, so that every viewer can show them on time.
+when it takes over a session of another replica or is connected to the bus again. It subscribes to `viewers` and
+responds to `state`. Overlays are computed for the time when they are due, `OVERLAY_LEAD_US` ahead of now, so that every
+viewer can show them on time.
 """
 
 from __future__ import annotations
@@ -124,15 +125,18 @@ class Stage:
         """Solve limbs with another solver from the next frame on."""
         self._marionettes.use_solver(solver)
 
-    def announce_takeover(self) -> None:
-        """Publish the state of a session that was another replica's: no limb is held any more."""
+    def announce(self) -> None:
+        """Publish the whole state, as others may have missed messages, and let them publish theirs again.
+
+        Called after a take-over, when no limb is held any more, and after each reconnection to the bus.
+        """
         self._bus.publish(f"session.{self.id}.appear", b"")
         self._bus.publish(f"session.{self.id}.timeline", self.timeline.pack())
         self.presence_publisher.publish()
-        self._sequence += 1
-        self._bus.publish(
-            f"session.{self.id}.overlay", Overlay(self._sequence, self._clock() + OVERLAY_LEAD_US, {}).pack()
-        )
+        if self._last_overlay is None:
+            self._sequence += 1
+            no_limb = Overlay(self._sequence, self._clock() + OVERLAY_LEAD_US, {})
+            self._bus.publish(f"session.{self.id}.overlay", no_limb.pack())
 
     @property
     def participant_count(self) -> int:

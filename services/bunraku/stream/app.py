@@ -133,24 +133,23 @@ def create_app(context: ServiceContext) -> FastAPI:
             options = ViewerOptions(rate, _parse_track_types(tracks), resume_state=_parse_resume_state(have))
             viewer = ViewerConnection(stream, options)
             try:
-                watched = await sessions.open(session)
+                async with sessions.open(session) as watched:
+                    connection, link = await _accept_viewer(socket, viewer, context.clock)
+                    stream.counters.count_writes(connection)
+                    watched.add_viewer(viewer)
+                    viewer.open(connection, link)
+                    connection.on_ended = stream.counters.add_viewer(
+                        viewer,
+                        "session",
+                        context.authenticator.register_connection(access_of(socket), viewer.disconnect),
+                    )
+                    if watched.close_reason is not None:
+                        # it has ended during the handshake
+                        viewer.disconnect(watched.close_reason)
             except NoResponse:
                 raise await _explain_unanswered_session(context.key_values, session) from None
             except BackendUnavailable as error:
                 raise CloseConnection.unavailable(error) from None
-            try:
-                connection, link = await _accept_viewer(socket, viewer, context.clock)
-                stream.counters.count_writes(connection)
-                watched.add_viewer(viewer)
-                viewer.open(connection, link)
-                connection.on_ended = stream.counters.add_viewer(
-                    viewer, "session", context.authenticator.register_connection(access_of(socket), viewer.disconnect)
-                )
-                if watched.close_reason is not None:
-                    # it has ended during the handshake
-                    viewer.disconnect(watched.close_reason)
-            finally:
-                sessions.close_if_empty(watched)
         except WebSocketDisconnect:
             # the client left during the handshake
             pass

@@ -6,7 +6,8 @@ import asyncio
 import contextlib
 import logging
 import secrets
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
 import msgpack
@@ -62,6 +63,8 @@ class WatchedSession:
         `state` is the session's answer to the request for its state; `on_empty` is called when the last viewer leaves.
         """
         self.id = session
+        self.opening_viewers = 0
+        """Number of viewers that wait for the session to become ready, or for their connection."""
         self._on_empty = on_empty
         self._source = source
         self._context = context
@@ -138,9 +141,9 @@ class WatchedSession:
         self._writable = None
 
     @property
-    def is_empty(self) -> bool:
-        """True if the session has no viewer here."""
-        return not self._viewers
+    def is_used(self) -> bool:
+        """True if the session has a viewer here, or one that is about to be added."""
+        return bool(self._viewers) or self.opening_viewers > 0
 
     def end(self) -> None:
         """Close the connections of all viewers, as the session has ended, and the subscriptions."""
@@ -280,11 +283,11 @@ class WatchedSessions:
             watched.close()
         self._sessions.clear()
 
-    async def open(self, session: str) -> WatchedSession:
-        """Return a session that is ready for viewers.
+    @asynccontextmanager
+    async def open(self, session: str) -> AsyncIterator[WatchedSession]:
+        """Keep a session open inside the block, ready for viewers; it stays open while it has any.
 
-        The caller must add a viewer or call `close_if_empty`. Raises `NoResponse` if
-        there is no such session, and `CloseConnection` if it cannot be watched.
+        Raises `NoResponse` if there is no such session, and `CloseConnection` if it cannot be watched.
         """
         if not is_subject_token(session):
             raise NoResponse(session)
@@ -297,18 +300,19 @@ class WatchedSessions:
                 # the session outlives the request of its first viewer, and must not log that request's id
                 with request_id.bind(""):
                     opened = WatchedSession(
-                        session, self._source, self._context, state, lambda: self.close_if_empty(opened)
+                        session, self._source, self._context, state, lambda: self._close_if_unused(opened)
                     )
                     self._sessions[session] = opened
                     # the state may have changed before the subscription
                     self._resynchronise(opened)
         watched = self._sessions[session]
+        watched.opening_viewers += 1
         try:
             await watched.wait_until_ready()
-        except BaseException:
-            self.close_if_empty(watched)
-            raise
-        return watched
+            yield watched
+        finally:
+            watched.opening_viewers -= 1
+            self._close_if_unused(watched)
 
     def __len__(self) -> int:
         return len(self._sessions)
@@ -349,9 +353,9 @@ class WatchedSessions:
             del self._sessions[session.id]
             session.end()
 
-    def close_if_empty(self, session: WatchedSession) -> None:
-        """Close a session that has no viewer here."""
-        if session.is_empty and self._sessions.get(session.id) is session:
+    def _close_if_unused(self, session: WatchedSession) -> None:
+        """Close a session without viewers, unless a viewer waits for it to become ready."""
+        if not session.is_used and self._sessions.get(session.id) is session:
             session.close()
             del self._sessions[session.id]
 
