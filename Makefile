@@ -71,9 +71,9 @@ lint: .setup/python
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-# two workers per processor, as many tests wait; the tests of a file run in one worker
+# two workers per processor, as many tests wait; the tests of a file run in one worker, in the order of tests/conftest.py
 test-python: setup
-	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile
+	$(BIN)/pytest --numprocesses $$((2 * $$(getconf _NPROCESSORS_ONLN))) --dist loadfile --no-loadscope-reorder
 
 # a million steps of the merge against its model, about fifteen minutes, and 10,000 simulations, about an hour
 test-nightly: setup

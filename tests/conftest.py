@@ -17,27 +17,34 @@ import pytest
 from httpx2._config import DEFAULT_TIMEOUT_CONFIG
 
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import COROUTINE_TIMEOUT_S, HANG_TIMEOUT_S
 
 # the duration of an example depends more on the machine than on the code
 hypothesis.settings.register_profile("bunraku", deadline=None)
 hypothesis.settings.load_profile("bunraku")
 
 # the default of 5 s suits interactive use, not a loaded machine
-DEFAULT_TIMEOUT_CONFIG.read = 60.0
+DEFAULT_TIMEOUT_CONFIG.read = HANG_TIMEOUT_S
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
-
-COROUTINE_TIMEOUT_S = 300.0
-"""Time after which a test that is a coroutine fails; it only ends tests that hang, also on a busy machine."""
+FIRST_FOLDERS = ("simulation", "attack", "e2e", "faults", "deploy", "fuzz", "session", "http", "client", "messaging")
+"""Folders of the longest test files. They run first, so that at the end no worker waits for a long file."""
 SUMMARY_LINES = pytest.StashKey[list[str]]()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Let a coroutine that hangs fail by itself, so that the report names it and other tests continue."""
+    """Run long files first, and let a coroutine that hangs fail at its step, before the time-out of pytest."""
+    items.sort(key=lambda item: _folder_rank(item.path))
     for item in items:
         if isinstance(item, pytest.Function) and inspect.iscoroutinefunction(item.obj):
             item.obj = fail_after(item.obj, COROUTINE_TIMEOUT_S)
+
+
+def _folder_rank(path: Path) -> int:
+    """Return the place of a test file in the order of folders."""
+    folder = path.relative_to(REPOSITORY / "tests").parts[0]
+    return FIRST_FOLDERS.index(folder) if folder in FIRST_FOLDERS else len(FIRST_FOLDERS)
 
 
 def fail_after(test: Callable[..., Awaitable[None]], timeout_s: float) -> Callable[..., Awaitable[None]]:

@@ -7,6 +7,8 @@ from urllib.request import urlopen
 
 from prometheus_client.parser import text_string_to_metric_families
 
+from tests.time_limit import HANG_TIMEOUT_S
+
 
 class MetricSamples:
     """Samples of one scrape."""
@@ -27,7 +29,7 @@ class MetricSamples:
 
 def scrape_metrics(port: int) -> MetricSamples:
     """Read the metrics of the server at a local port."""
-    with urlopen(f"http://127.0.0.1:{port}/metrics", timeout=10) as answer:
+    with urlopen(f"http://127.0.0.1:{port}/metrics", timeout=HANG_TIMEOUT_S) as answer:
         assert answer.headers["Content-Type"].startswith("text/plain")
         return MetricSamples(answer.read().decode())
 

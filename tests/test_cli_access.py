@@ -20,6 +20,7 @@ from bunraku.http.access_token import TokenSigner
 from bunraku.http.secret import SECRET_FILE_NAME, load_or_create_secret
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 RUN = CliRunner()
 BUNRAKU = Path(sys.executable).parent / "bunraku"
@@ -29,7 +30,9 @@ BUNRAKU = Path(sys.executable).parent / "bunraku"
 def protected(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, str]]:
     """Address of a server with a secret, and the id of a session."""
     with run_server(tmp_path_factory.mktemp("protected"), secret=SECRET) as url:
-        with httpx2.Client(base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=60) as http:
+        with httpx2.Client(
+            base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=HANG_TIMEOUT_S
+        ) as http:
             motion = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(2.0, 5)).json()["id"]
             session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
         yield url, session
@@ -142,7 +145,7 @@ def read_until(process: subprocess.Popen[str], pattern: str) -> str:
     for line in process.stdout:
         if match := re.search(pattern, line):
             return match[1]
-    raise AssertionError(f"the command ended with {process.wait(10)}")
+    raise AssertionError(f"the command ended with {process.wait(HANG_TIMEOUT_S)}")
 
 
 def test_public_server_creates_a_secret_and_prints_a_link(tmp_path: Path) -> None:
@@ -157,7 +160,7 @@ def test_public_server_creates_a_secret_and_prints_a_link(tmp_path: Path) -> Non
         assert jwt.decode(token, options={"verify_signature": False})["sub"] == "operator"
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(HANG_TIMEOUT_S)
         assert process.stdout is not None
         process.stdout.close()
 
@@ -171,14 +174,14 @@ def test_secret_in_environment_applies_on_loopback_too(tmp_path: Path) -> None:
         assert not (tmp_path / "data" / SECRET_FILE_NAME).exists()
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(HANG_TIMEOUT_S)
         assert process.stdout is not None
         process.stdout.close()
 
 
 def test_public_processes_with_a_bus_need_a_shared_secret(tmp_path: Path) -> None:
     process = start_up_command(tmp_path, "--host", "0.0.0.0", BUNRAKU_BUS="nats://127.0.0.1:9")
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=HANG_TIMEOUT_S)
     assert process.returncode == 1
     assert "set BUNRAKU_SECRET" in output
     assert "Traceback" not in output
@@ -194,14 +197,14 @@ def test_published_address_decides_whether_a_secret_is_needed(
         assert httpx2.get(f"{url}/v1/motions").status_code == (401 if needs_token else 200)
     finally:
         process.terminate()
-        process.wait(20)
+        process.wait(HANG_TIMEOUT_S)
         assert process.stdout is not None
         process.stdout.close()
 
 
 def test_short_secret_is_reported_without_its_value(tmp_path: Path) -> None:
     process = start_up_command(tmp_path, BUNRAKU_SECRET="tooshortasecret")
-    output, _ = process.communicate(timeout=60)
+    output, _ = process.communicate(timeout=HANG_TIMEOUT_S)
     assert process.returncode != 0
     assert "32 bytes" in output
     assert "tooshortasecret" not in output

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 ROOT = Path(__file__).resolve().parent.parent
 README = ROOT / "README.md"
@@ -43,7 +44,7 @@ def run_python(code: str, server: str, folder: Path) -> str:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=HANG_TIMEOUT_S,
         check=False,
     )
     assert result.returncode == 0, result.stderr
@@ -67,7 +68,9 @@ def test_sdk_python_example_records_a_motion(server: str, folder: Path) -> None:
 def test_readme_curl_examples_answer(server: str, folder: Path) -> None:
     script = "set -e\n" + code_block(README, "sh", "curl").replace("http://127.0.0.1:8000", server)
     script = script.replace("curl -s", "curl -sf")
-    ran = subprocess.run(["bash", "-c", script], cwd=folder, capture_output=True, text=True, timeout=60, check=False)
+    ran = subprocess.run(
+        ["bash", "-c", script], cwd=folder, capture_output=True, text=True, timeout=HANG_TIMEOUT_S, check=False
+    )
     assert ran.returncode == 0, ran.stderr
     assert '"fps":30' in ran.stdout
     assert '"limbs":[null,null,null,null]' in ran.stdout
@@ -93,13 +96,17 @@ def documented_commands() -> list[tuple[str, ...]]:
 @pytest.mark.parametrize("command", documented_commands(), ids=" ".join)
 def test_documented_command_exists_with_its_options(command: tuple[str, ...]) -> None:
     names, *options = command
-    shown = subprocess.run([BUNRAKU, *names.split(), "--help"], capture_output=True, text=True, timeout=60, check=False)
+    shown = subprocess.run(
+        [BUNRAKU, *names.split(), "--help"], capture_output=True, text=True, timeout=HANG_TIMEOUT_S, check=False
+    )
     assert shown.returncode == 0, shown.stderr
     assert [option for option in options if option not in shown.stdout] == []
 
 
 def test_every_command_is_documented() -> None:
-    shown = subprocess.run([BUNRAKU, "--help"], capture_output=True, text=True, timeout=60, check=True).stdout
+    shown = subprocess.run(
+        [BUNRAKU, "--help"], capture_output=True, text=True, timeout=HANG_TIMEOUT_S, check=True
+    ).stdout
     commands = set(re.findall(r"^│ ([a-z]+) ", shown.partition("Commands")[2], re.MULTILINE))
     documented = {names.split()[0] for names, *_ in documented_commands()}
     assert commands

@@ -12,13 +12,16 @@ from bunraku.http.access_control import Role
 from bunraku.http.access_token import MAX_SHARE_LIFETIME_S
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture(scope="module")
 def http(tmp_path_factory: pytest.TempPathFactory) -> Iterator[httpx2.Client]:
     with (
         run_server(tmp_path_factory.mktemp("access"), secret=SECRET) as url,
-        httpx2.Client(base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=60) as client,
+        httpx2.Client(
+            base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=HANG_TIMEOUT_S
+        ) as client,
     ):
         yield client
 

@@ -16,6 +16,7 @@ from websockets.typing import Subprotocol
 
 from bunraku.client.message_socket import MessageSocket
 from bunraku.wire.messages import SUBPROTOCOL
+from tests.time_limit import HANG_TIMEOUT_S
 
 URL = "ws://stage/v1/sessions/s1/stream?rate=0"
 
@@ -128,7 +129,10 @@ async def test_real_server_and_client_exchange_messages() -> None:
         async for message in connection:
             await connection.send(message)
 
-    async with serve(echo, "127.0.0.1", 0, subprotocols=[Subprotocol(SUBPROTOCOL)]) as server, asyncio.timeout(20):
+    async with (
+        serve(echo, "127.0.0.1", 0, subprotocols=[Subprotocol(SUBPROTOCOL)]) as server,
+        asyncio.timeout(HANG_TIMEOUT_S),
+    ):
         port = next(iter(server.sockets)).getsockname()[1]
         client = RecordingSocket(f"ws://127.0.0.1:{port}/stream")
         await client.open()
@@ -154,6 +158,6 @@ async def test_rejected_handshake_is_an_error_with_its_reason(response: bytes, e
 
     async with await asyncio.start_server(reject, "127.0.0.1", 0) as server:
         port = server.sockets[0].getsockname()[1]
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             with pytest.raises(ConnectionError, match=error):
                 await RecordingSocket(f"ws://127.0.0.1:{port}/stream").open()

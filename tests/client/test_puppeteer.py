@@ -12,6 +12,7 @@ from bunraku.motion import rotation
 from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
 from bunraku.playout.block_store import Pose
 from bunraku.wire.messages import Input, unpack
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.mark.parametrize("silent", [False, True], ids=["heard all along", "silent for a while"])
@@ -79,7 +80,7 @@ async def test_a_held_limb_is_asked_for_and_given(server: str, clip_file: Path) 
             await ben.ask("right_leg")
             await aiko.claim("left_hand")
             asking = asyncio.create_task(ben.ask("left_hand"))
-            async with asyncio.timeout(10):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while aiko.presence is None or not aiko.presence.asks[0]:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
             assert aiko.presence.asks[0] == [ben.id]
@@ -89,7 +90,7 @@ async def test_a_held_limb_is_asked_for_and_given(server: str, clip_file: Path) 
             with pytest.raises(ControlRefused, match="not given"):
                 await aiko.ask("left_hand", seconds=0.2)
             await ben.target("left_hand", 50.0, 0.2, 0.4)
-            async with asyncio.timeout(10):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while ben.notice is None:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
             assert (ben.notice.limb, ben.notice.reason) == (0, "reach")

@@ -26,6 +26,7 @@ from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.audio import decode_opus, find_onset, make_click
 from tests.servers import run_server
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera, sample_light
 
@@ -226,7 +227,7 @@ async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> N
     async with door.open() as viewer:
         shown = asyncio.Event()
         watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await shown.wait()
         door.cut.set()
         figures = await watching
@@ -251,7 +252,7 @@ async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what
                     (again if len(door.queries) > 1 else shown).set()
 
             watching = asyncio.create_task(viewer.watch(5.0, see))
-            async with asyncio.timeout(30):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 await shown.wait()
                 door.cut.set()
                 await again.wait()
@@ -299,7 +300,7 @@ async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_p
                     best.set()
 
             watching = asyncio.create_task(viewer.watch(60.0, see))
-            async with asyncio.timeout(30):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 await best.wait()
             watching.cancel()
             await asyncio.gather(watching, return_exceptions=True)

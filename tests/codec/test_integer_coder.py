@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.integer_coder import decode_integers, encode_integers
+from tests.time_limit import HANG_TIMEOUT_S
 
 INTEGERS = st.lists(st.integers(-40_000, 40_000) | st.integers(-3, 3), min_size=1, max_size=60)
 
@@ -46,4 +47,4 @@ def test_arbitrary_bytes_are_decoded_or_refused(data: bytes) -> None:
 
 def test_parsing_a_track_does_not_import_numba() -> None:
     code = "import sys, bunraku.codec.motion_track; sys.exit('numba' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], timeout=60, check=False).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], timeout=HANG_TIMEOUT_S, check=False).returncode == 0

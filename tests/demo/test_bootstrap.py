@@ -14,6 +14,7 @@ from bunraku.runtime.context import open_context
 from bunraku.runtime.settings import Settings
 from bunraku.session.session_manager import SessionManager
 from tests.processes import nats_url_of, run_jetstream, run_postgres
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -86,7 +87,7 @@ async def test_concurrent_replicas_create_one_motion_and_one_session(tmp_path: P
             backing = await stack.enter_async_context(open_context(shared))
             replicas.append((backing, SessionManager(backing)))
             stack.push_async_callback(replicas[-1][1].close)
-        async with asyncio.timeout(90):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await asyncio.gather(*(bootstrap.open_demo_stage(backing, sessions) for backing, sessions in replicas))
         assert len(danced) == 1
         backing, sessions = replicas[0]

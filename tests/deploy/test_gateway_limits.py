@@ -18,9 +18,9 @@ from tests.conftest import REPOSITORY
 from tests.credentials import SECRET
 from tests.processes import ServerProcess, find_program, free_port
 from tests.servers import run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 CADDYFILE = (REPOSITORY / "deploy" / "Caddyfile").read_text()
-TIMEOUT_S = 30
 """Time within which the gateway must have closed a connection; its own limits are shortened to one second."""
 BURST = 10
 """Requests that an address may send at once."""
@@ -84,7 +84,7 @@ async def run_recording_service(response: bytes = b"ok") -> AsyncIterator[tuple[
         yield service, listening.sockets[0].getsockname()[1]
     finally:
         listening.close()
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await asyncio.gather(*service.connections)
 
 
@@ -93,7 +93,7 @@ async def send_and_read(port: int, data: bytes) -> bytes:
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     try:
         writer.write(data)
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             with suppress(ConnectionError):
                 return await reader.read()
             return b""
@@ -141,7 +141,7 @@ async def test_unread_response_is_aborted(tmp_path: Path, monkeypatch: pytest.Mo
             reader, writer = await asyncio.open_connection("127.0.0.1", port)
             writer.write(b"GET / HTTP/1.1\r\nHost: a\r\n\r\n")
             # asyncio stops to read once its buffer is full
-            async with asyncio.timeout(TIMEOUT_S):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 await service.aborted.wait()
             writer.close()
             del reader

@@ -23,11 +23,11 @@ from bunraku.client import Client, Puppeteer, Viewer
 from tests.conftest import REPOSITORY
 from tests.processes import ServerProcess, find_program, free_port, nats_url_of, run_jetstream
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 OBSERVE = REPOSITORY / "deploy" / "observe"
 DASHBOARD: dict[str, Any] = json.loads((OBSERVE / "dashboard.json").read_text())
 CONFIG: dict[str, Any] = yaml.safe_load((OBSERVE / "prometheus.yml").read_text())
-TIMEOUT_S = 60
 
 
 def dashboard_queries() -> list[tuple[str, str]]:
@@ -43,7 +43,7 @@ class Prometheus:
 
     def get(self, path: str, **query: str) -> Any:
         """Return the `data` of a response; fail unless its status is success."""
-        with urlopen(f"{self._url}/{path}?{urlencode(query)}", timeout=10) as http_response:
+        with urlopen(f"{self._url}/{path}?{urlencode(query)}", timeout=HANG_TIMEOUT_S) as http_response:
             response = json.load(http_response)
         assert response["status"] == "success", response
         return response["data"]
@@ -116,7 +116,7 @@ async def test_every_panel_and_rule_has_data(
 ) -> None:
     source = tmp_path / "one.bvh"
     source.write_bytes(make_bvh_clip(4.0, 1))
-    end = time.monotonic() + TIMEOUT_S
+    end = time.monotonic() + HANG_TIMEOUT_S
     # a counter has no rate after its first increment: repeat until every panel has data
     missing = dashboard_queries()
     while missing:

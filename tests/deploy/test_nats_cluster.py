@@ -16,6 +16,7 @@ from bunraku.runtime.availability import BackendUnavailable
 from tests.deploy.manifests import KUBERNETES
 from tests.deploy.nats_config import create_certificates, localize_config
 from tests.processes import ServerProcess, find_program, free_port
+from tests.time_limit import HANG_TIMEOUT_S
 
 SERVERS = 3
 CONFIG = KUBERNETES / "overlays" / "cluster" / "nats.conf"
@@ -50,7 +51,7 @@ def servers(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[list[Se
 
 async def put_when_available(key_values: NatsKeyValueStore, key: str, value: bytes) -> None:
     """Put a value; retry until the servers have elected a leader."""
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 await key_values.put(key, value)
@@ -62,7 +63,7 @@ async def put_when_available(key_values: NatsKeyValueStore, key: str, value: byt
 
 async def synchronise_when_available(key_values: NatsKeyValueStore) -> None:
     """Wait until the local copy is current; retry until the servers have elected a leader."""
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 await key_values.synchronise()
@@ -102,7 +103,7 @@ async def test_key_value_store_survives_the_loss_of_any_one_server(
 async def wait_for_replication(bus: NatsBus) -> None:
     """Wait until the bucket is up to date at every server."""
 
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 info = json.loads(await bus.request("$JS.API.STREAM.INFO.KV_bunraku"))

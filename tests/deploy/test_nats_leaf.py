@@ -27,9 +27,9 @@ from tests.conftest import REPOSITORY
 from tests.deploy.nats_config import create_certificates, localize_config
 from tests.processes import ServerProcess, find_program, free_port
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 PASSWORD = "0123abcd"
-TIMEOUT_S = 60
 REQUIRED_OVERLAYS = 60
 """Overlays that every viewer must receive."""
 
@@ -149,7 +149,7 @@ async def test_overlay_reaches_another_region_and_crosses_the_link_once(regions:
         before = regions.leaf_message_count()
         puppeteer = await stack.enter_async_context(Puppeteer(home, session, "Aiko"))
         controlling = asyncio.create_task(control_left_hand(puppeteer))
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await asyncio.gather(*(viewer.enough.wait() for viewer in (near, one, other)))
         controlling.cancel()
         await asyncio.wait((controlling,))
@@ -158,7 +158,7 @@ async def test_overlay_reaches_another_region_and_crosses_the_link_once(regions:
         # once for both replicas; a watched session causes few other messages
         assert REQUIRED_OVERLAYS <= link_messages < 1.5 * overlays
         # the number of viewers at the leaf is known at the hub
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while (await home.session(session))["viewers"] != 3:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
 
@@ -184,7 +184,7 @@ async def test_leaf_adds_little_latency(regions: RegionDeployment, tally: Callab
             await wait_for_subscription(source, bus)
         for number in range(REQUIRED_OVERLAYS):
             source.publish("session.a.overlay", bytes(66))
-            async with asyncio.timeout(TIMEOUT_S):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while min(map(len, arrivals.values())) <= number:
                     changed.clear()
                     await changed.wait()
@@ -200,7 +200,7 @@ async def wait_for_subscription(source: NatsBus, bus: NatsBus) -> None:
     """Wait until a message published at `source` reaches `bus`."""
     own_replacements = asyncio.Event()
     subscription = bus.subscribe("there", lambda _: own_replacements.set())
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while not own_replacements.is_set():
             source.publish("there", b"")
             await asyncio.sleep(0.01)

@@ -18,8 +18,8 @@ from bunraku.http.access_control import Role
 from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, Welcome, unpack
 from tests.credentials import OTHER_SECRET, SECRET, bearer_headers, make_token, make_unsigned_token, sign_token
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
-TIMEOUT_S = 20
 UNKNOWN_ID = "x" * 20
 """An id that does not exist."""
 
@@ -109,7 +109,9 @@ class GuardedServer:
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[GuardedServer]:
     with run_server(tmp_path_factory.mktemp("guarded"), secret=SECRET, connects=0) as url:
-        with httpx2.Client(base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=60) as http:
+        with httpx2.Client(
+            base_url=url, headers=bearer_headers(make_token(subject="host")), timeout=HANG_TIMEOUT_S
+        ) as http:
             motion = http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(2.0, 5)).json()["id"]
             session = http.post("/v1/sessions", json={"motion": motion}).json()["id"]
             share = http.post("/v1/shares", json={"session": session}).json()
@@ -154,7 +156,7 @@ def test_invalid_token_is_rejected_on_every_route(guarded: GuardedServer, bad: s
 
 @pytest.mark.parametrize("role", Role)
 def test_role_grants_exactly_the_listed_routes(guarded: GuardedServer, role: Role) -> None:
-    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(make_token(role)), timeout=60) as http:
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(make_token(role)), timeout=HANG_TIMEOUT_S) as http:
         for (method, path), required_role in ROUTES.items():
             if method == "DELETE" and role >= (required_role or Role.VIEW):
                 continue  # deletions have their own tests below
@@ -172,7 +174,7 @@ def test_role_grants_exactly_the_listed_routes(guarded: GuardedServer, role: Rol
 
 async def read_until_closed(socket: ClientConnection) -> None:
     """Read until the server closes the connection."""
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             await socket.recv()
 
@@ -236,7 +238,9 @@ async def test_missing_subprotocol_closes_with_4406(guarded: GuardedServer) -> N
 
 
 async def test_bound_token_sees_nothing_but_its_resource(guarded: GuardedServer) -> None:
-    async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token()), timeout=60) as host:
+    async with httpx2.AsyncClient(
+        base_url=guarded.url, headers=bearer_headers(make_token()), timeout=HANG_TIMEOUT_S
+    ) as host:
         other = (await host.post("/v1/motions?filename=b.bvh", content=make_bvh_clip(1.0, 6))).json()["id"]
         other_session = (await host.post("/v1/sessions", json={"motion": other})).json()["id"]
         for bound, bound_id in (("session", guarded.session), ("motion", guarded.motion)):
@@ -283,7 +287,7 @@ async def test_bound_token_sees_nothing_but_its_resource(guarded: GuardedServer)
 
 
 def test_motion_is_deleted_by_its_owner_or_an_admin(guarded: GuardedServer) -> None:
-    with httpx2.Client(base_url=guarded.url, timeout=60) as http:
+    with httpx2.Client(base_url=guarded.url, timeout=HANG_TIMEOUT_S) as http:
         mine, theirs = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
         made = http.post("/v1/motions?filename=c.bvh", content=make_bvh_clip(1.0, 7), headers=mine).json()["id"]
         assert http.delete(f"/v1/motions/{made}", headers=theirs).status_code == 403
@@ -349,7 +353,7 @@ async def test_websocket_closes_when_its_token_expires(guarded: GuardedServer) -
 
 @pytest.mark.parametrize("token", [make_token(), make_token(Role.VIEW), None, "malformed"])
 def test_no_response_of_a_protected_route_is_cached_by_proxies(guarded: GuardedServer, token: str | None) -> None:
-    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(token), timeout=60) as http:
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(token), timeout=HANG_TIMEOUT_S) as http:
         for (method, path), role in ROUTES.items():
             if role is None or method == "DELETE":
                 continue

@@ -20,8 +20,8 @@ from bunraku.wire.messages import SUBPROTOCOL, Welcome, unpack
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.processes import ServerProcess, free_port, nats_url_of, run_jetstream
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
-TIMEOUT_S = 20
 SERVICES = ("ingest", "session 1", "session 2")
 
 
@@ -50,7 +50,7 @@ class Deployment:
     async def wait_for_log(self, name: str, request: str, event: str, **more: Any) -> None:
         """Wait until a process has logged an event of a request."""
         expected = {"event": event, **more}
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not any(expected.items() <= line.items() for line in self.log_lines(name, request)):  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
 
@@ -73,7 +73,7 @@ def deployment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Depl
 
 async def test_request_id_is_the_same_in_every_process_and_no_secret_is_logged(deployment: Deployment) -> None:
     token = make_token()
-    async with httpx2.AsyncClient(headers=bearer_headers(token), timeout=60) as http:
+    async with httpx2.AsyncClient(headers=bearer_headers(token), timeout=HANG_TIMEOUT_S) as http:
 
         async def call(method: str, name: str, path: str, request: str, **more: Any) -> Any:
             response = await http.request(

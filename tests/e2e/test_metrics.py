@@ -19,8 +19,7 @@ from tests.credentials import SECRET, bearer_headers, make_token
 from tests.metrics import scrape_metrics, scrape_until
 from tests.processes import free_port
 from tests.servers import make_bvh_clip, run_server
-
-TIMEOUT_S = 20
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class CountingViewer:
@@ -71,7 +70,7 @@ class CountingViewer:
 
     async def wait_for_messages(self, kind: int, number: int) -> None:
         """Wait until `number` messages of a type were received."""
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while self.types.count(kind) < number:
                 self._changed.clear()
                 await self._changed.wait()
@@ -83,7 +82,7 @@ class CountingViewer:
     async def close(self) -> None:
         """Send a close frame and read until the server closes."""
         self._send_frame(Opcode.CLOSE, (1000).to_bytes(2))
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await self._reading
         self._writer.close()
 
@@ -105,7 +104,7 @@ async def test_metrics_equal_what_clients_counted(tmp_path: Path) -> None:
                     values[key] = found.sum(name, **dict(zip(labels[::2], labels[1::2], strict=True)))
                 return values
 
-            end = asyncio.get_running_loop().time() + TIMEOUT_S
+            end = asyncio.get_running_loop().time() + HANG_TIMEOUT_S
             while (values := await asyncio.to_thread(read_metrics)) != expected:
                 assert asyncio.get_running_loop().time() < end, f"metrics are {values}, expected {expected}"
 
@@ -141,7 +140,7 @@ async def test_metrics_equal_what_clients_counted(tmp_path: Path) -> None:
                 await viewers[-1].wait_for_messages(Overlay.TYPE, 5)
             # the puppeteer left, and the limb returns to the motion
             await wait_for_metrics(puppeteers=0, limbs_held=0)
-            async with asyncio.timeout(TIMEOUT_S):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while viewers[0].limbs[-1]:  # noqa: ASYNC110
                     await asyncio.sleep(0.02)
 
@@ -158,7 +157,7 @@ async def test_metrics_equal_what_clients_counted(tmp_path: Path) -> None:
             assert found.sum("sent_overlays_total") == sum(viewer.types.count(5) for viewer in all_viewers)
             assert found.sum("sent_overlays_total") >= 12 * 5
             assert found.sum("solve_duration_seconds_count") >= 5
-            assert 0 < found.sum("solve_duration_seconds_sum") < TIMEOUT_S
+            assert 0 < found.sum("solve_duration_seconds_sum") < HANG_TIMEOUT_S
             assert found.sum("slow_viewers") == found.sum("held_bytes") == found.sum("skipped_overlays_total") == 0
 
             # requests are labelled by route, not by path or id

@@ -14,6 +14,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from tests.time_limit import HANG_TIMEOUT_S
+
 pytestmark = pytest.mark.timeout(900)
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -60,11 +62,11 @@ def address(installed: Path, environment: dict[str, str], tmp_path: Path) -> Ite
     assert process.stdout is not None
     try:
         found = next(filter(None, (re.search(r"(http://127\.0\.0\.1:\d+)/", line) for line in process.stdout)), None)
-        assert found is not None, f"the command ended with {process.wait(10)}"
+        assert found is not None, f"the command ended with {process.wait(HANG_TIMEOUT_S)}"
         yield found[1]
     finally:
         process.terminate()
-        process.wait(60)
+        process.wait(HANG_TIMEOUT_S)
         process.stdout.close()
 
 

@@ -17,8 +17,7 @@ from bunraku.wire.messages import SUBPROTOCOL, Presence, TimelineState, unpack
 from bunraku.wire.overlay import Overlay
 from tests.processes import ServerProcess, free_port, nats_url_of, run_jetstream
 from tests.servers import make_bvh_clip
-
-TIMEOUT_S = 20
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class Deployment:
@@ -75,7 +74,7 @@ class RecordingViewer:
     async def wait_for(self, matches: Callable[[object], bool]) -> None:
         """Wait for the next message for which `matches` returns true."""
         begin = len(self.messages)
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not any(map(matches, self.messages[begin:])):
                 self._changed.clear()
                 await self._changed.wait()
@@ -115,7 +114,7 @@ async def watch_session(url: str, session: str) -> AsyncIterator[RecordingViewer
 
 async def open_puppeteer(stack: AsyncExitStack, client: Client, session: str) -> Puppeteer:
     """Connect a puppeteer and claim the left hand; retry while the session has no owner."""
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 puppeteer = await stack.enter_async_context(Puppeteer(client, session, "Aiko"))
@@ -130,7 +129,7 @@ async def open_puppeteer(stack: AsyncExitStack, client: Client, session: str) ->
 
 async def retry_until_available(request: Callable[[], Awaitable[dict[str, Any]]]) -> dict[str, Any]:
     """Return the response of `request`; retry while it is rejected with 503."""
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 return await request()
@@ -172,7 +171,7 @@ async def test_session_is_controlled_through_any_replica_and_outlives_its_owner(
         described = await two.session(session)
         assert (described["epoch"], described["motion"]) == (2, motion)
         assert described["limbs"] == [puppeteer.id, None, None, None]
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while (await two.session(session))["viewers"] != 2:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
         # a replica that shuts down in order hands its sessions over

@@ -15,6 +15,8 @@ from pathlib import Path
 import httpx2
 import pytest
 
+from tests.time_limit import HANG_TIMEOUT_S
+
 BUNRAKU = Path(sys.executable).parent / "bunraku"
 
 
@@ -48,12 +50,12 @@ def up(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[tuple[subproc
             if found := re.search(r"is at (http://\S+)/", line):
                 url = found[1]
                 break
-        assert url is not None, f"the command ended with {process.wait(10)}"
+        assert url is not None, f"the command ended with {process.wait(HANG_TIMEOUT_S)}"
         yield process, url
     finally:
         if process.poll() is None:
             process.kill()
-            process.wait(10)
+            process.wait(HANG_TIMEOUT_S)
         process.stdout.close()
 
 
@@ -78,15 +80,15 @@ def test_demo_plays_and_ctrl_c_ends_every_process(up: tuple[subprocess.Popen[str
         capture_output=True,
         text=True,
         check=True,
-        timeout=60,
+        timeout=HANG_TIMEOUT_S,
     )
     statistics = json.loads(watched.stdout)
     assert statistics["frames"] > 10
     assert statistics["gaps"] == 0
     os.killpg(process.pid, signal.SIGINT)
-    assert process.wait(20) == 0
+    assert process.wait(HANG_TIMEOUT_S) == 0
     # the process that forks jobs ends when it detects the end of this one
-    deadline = time.monotonic() + 5
+    deadline = time.monotonic() + HANG_TIMEOUT_S
     while remaining := process_group_members(process.pid):
         assert time.monotonic() < deadline, f"still running: {remaining}"
         time.sleep(0.01)
@@ -96,7 +98,11 @@ def test_demo_plays_and_ctrl_c_ends_every_process(up: tuple[subprocess.Popen[str
 def test_port_in_use_is_reported_without_traceback(up: tuple[subprocess.Popen[str], str]) -> None:
     _, url = up
     second = subprocess.run(
-        [BUNRAKU, "up", "--port", url.rpartition(":")[2]], capture_output=True, text=True, timeout=60, check=False
+        [BUNRAKU, "up", "--port", url.rpartition(":")[2]],
+        capture_output=True,
+        text=True,
+        timeout=HANG_TIMEOUT_S,
+        check=False,
     )
     assert second.returncode == 1
     assert "Cannot listen" in second.stderr

@@ -14,6 +14,7 @@ import pytest
 from bunraku.ingest.motion_id import derive_motion_id
 from tests.processes import ServerProcess, free_port
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 def make_ingest_process(folder: Path, name: str) -> ServerProcess:
@@ -36,11 +37,11 @@ async def test_job_of_a_killed_server_is_finished_by_another(tmp_path: Path, mon
         for process in (first, second):
             stack.callback(process.stop)
             await asyncio.to_thread(process.start)
-        async with httpx2.AsyncClient(timeout=60.0) as http:
+        async with httpx2.AsyncClient(timeout=HANG_TIMEOUT_S) as http:
             one, two = (f"http://127.0.0.1:{process.port}/v1" for process in (first, second))
             query = {"filename": "long.bvh", "upload": "a-long-one"}
             sending = asyncio.create_task(http.post(f"{one}/motions", params=query, content=upload))
-            async with asyncio.timeout(60):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while True:
                     assert not sending.done(), "the upload was encoded before the server could be killed"
                     status = await http.get(f"{one}/uploads/a-long-one")
@@ -50,11 +51,11 @@ async def test_job_of_a_killed_server_is_finished_by_another(tmp_path: Path, mon
             with pytest.raises(httpx2.TransportError):
                 await sending
             assert (await http.get(f"{two}/motions")).json()["items"] == [], "an unfinished motion is listed"
-            async with asyncio.timeout(90):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while (await http.get(f"{two}/motions/{motion}")).status_code != 200:  # noqa: ASYNC110
                     await asyncio.sleep(0.2)
             (listed,) = (await http.get(f"{two}/motions")).json()["items"]
             assert (listed["id"], listed["filename"]) == (motion, "long.bvh")
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while pending_sources(tmp_path / "data" / "library" / "sources"):  # noqa: ASYNC110
                     await asyncio.sleep(0.05)

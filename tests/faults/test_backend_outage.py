@@ -15,6 +15,7 @@ import pytest
 from bunraku.client import Client, Puppeteer, ServerProblem, Viewer
 from tests.processes import ServerProcess, nats_url_of, run_jetstream, run_postgres, run_s3_server
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class Deployment:
@@ -96,7 +97,7 @@ async def test_playback_continues_while_catalogue_and_bus_are_unavailable(
         viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
         shown = asyncio.Event()
         watching = asyncio.create_task(viewer.watch(6.0, lambda _, __: shown.set()))
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await shown.wait()
         deployment.database.kill()
         deployment.bus.kill()
@@ -104,7 +105,7 @@ async def test_playback_continues_while_catalogue_and_bus_are_unavailable(
             assert await response_status(request) == 503
         deployment.database.start()
         deployment.bus.start()
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while (status := await response_status(client.upload(write_clip(tmp_path)))) != 200:
                 assert status == 503
         statistics = await watching

@@ -24,8 +24,8 @@ from bunraku.runtime.settings import Settings
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.processes import free_port
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
-TIMEOUT_S = 60
 MAX_GROWTH_KB = 50_000
 CLIENTS = 8
 ARM = "396-352-252-560-320-120"
@@ -70,7 +70,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedProcess]:
         process = subprocess.Popen(command, stdout=output, stderr=output, env=environment, cwd=folder)
     url = f"http://127.0.0.1:{port}"
     try:
-        with httpx2.Client(base_url=url, timeout=TIMEOUT_S) as http:
+        with httpx2.Client(base_url=url, timeout=HANG_TIMEOUT_S) as http:
             for _ in range(600):
                 with contextlib.suppress(httpx2.TransportError):
                     if http.get("/readyz").status_code == 200:
@@ -83,7 +83,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[ServedProcess]:
     finally:
         process.terminate()
         try:
-            process.wait(20)
+            process.wait(HANG_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
@@ -123,7 +123,7 @@ HOSTILE_BODIES = {
 async def test_hostile_body_costs_the_server_no_memory(
     served: ServedProcess, path: str, body: bytes, headers: dict[str, str]
 ) -> None:
-    async with httpx2.AsyncClient(base_url=served.url, timeout=TIMEOUT_S) as http:
+    async with httpx2.AsyncClient(base_url=served.url, timeout=HANG_TIMEOUT_S) as http:
         motion = (await http.get("/v1/motions", headers=admin())).json()["items"][0]["id"]
         session = (await http.post("/v1/sessions", json={"motion": motion}, headers=admin())).json()["id"]
         paths = {"/scene": f"/v1/motions/{motion}/scene", "/recordings": f"/v1/sessions/{session}/recordings"}
@@ -148,7 +148,7 @@ async def test_client_that_leaves_within_its_body_is_logged_as_499(served: Serve
         client.sendall("\r\n".join([*head, "", ""]).encode() + b"[")
         # reset instead of an orderly end
         client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             records = [record for record in served.log_records() if record.get("request_id") == request_id]
             if any(record["event"] == "request" for record in records):

@@ -15,6 +15,7 @@ from bunraku.client.api import Client
 from bunraku.client.puppeteer import Puppeteer
 from bunraku.wire.messages import SUBPROTOCOL, Claim, Grant, Input, Message, Notice, Presence, Problem, Refusal, unpack
 from bunraku.wire.overlay import Overlay
+from tests.time_limit import HANG_TIMEOUT_S
 
 FLOOD_INPUTS = 5_000
 
@@ -27,7 +28,7 @@ class RawPuppeteer:
         self.sequence = 0
 
     async def wait_for(self, kind: type[Message]) -> Message:
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while True:
                 data = await self.socket.recv()
                 assert isinstance(data, bytes)
@@ -127,7 +128,7 @@ async def test_input_flood_is_rate_limited_without_effect_on_others(server: str,
             flooding = asyncio.create_task(send_flood())
             overlays: list[Overlay] = []
             presences: list[Presence] = []
-            async with asyncio.timeout(60):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 assert (await wait_for_rate_notice()).limb == 0
                 while len(overlays) < 60:
                     data = await viewer.recv()

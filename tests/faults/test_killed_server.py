@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 import httpx2
 
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 BUNRAKU = Path(sys.executable).parent / "bunraku"
 KILLS = int(os.environ.get("BUNRAKU_KILLS", "3"))
@@ -72,7 +73,7 @@ def running_workers(folder: Path) -> list[int]:
 
 
 def wait_until(condition: Callable[[], bool], reason: str) -> None:
-    deadline = time.monotonic() + 90
+    deadline = time.monotonic() + HANG_TIMEOUT_S
     while not condition():
         assert time.monotonic() < deadline, reason
         time.sleep(0.02)
@@ -87,7 +88,7 @@ def test_nothing_is_left_after_kills_and_the_next_start(tmp_path: Path) -> None:
 
             def upload(address: str) -> None:
                 with contextlib.suppress(httpx2.HTTPError):
-                    httpx2.post(f"{address}/v1/motions?filename=a.bvh", content=clip, timeout=100)
+                    httpx2.post(f"{address}/v1/motions?filename=a.bvh", content=clip, timeout=HANG_TIMEOUT_S)
 
             sending = threading.Thread(target=upload, args=(url,))
             sending.start()
@@ -115,5 +116,5 @@ def test_nothing_is_left_after_kills_and_the_next_start(tmp_path: Path) -> None:
         assert len(list((tmp_path / "temporary").iterdir())) <= 1
         assert httpx2.get(f"{url}/v1/health").status_code == 200
         process.send_signal(signal.SIGINT)
-        process.wait(60)
+        process.wait(HANG_TIMEOUT_S)
     assert left_files(tmp_path) == []

@@ -7,7 +7,6 @@ import contextlib
 import gzip
 import json
 import tempfile
-import time
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -25,8 +24,7 @@ from bunraku.http.access_control import Role
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, SUBPROTOCOL
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.servers import make_bvh_clip, run_server
-
-TIMEOUT_S = 30
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +59,7 @@ async def send_raw(url: str, *pieces: bytes, interval_s: float = 0.0) -> bytes:
 
     sending = asyncio.create_task(send())
     try:
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             response = b""
             with contextlib.suppress(OSError):
                 while more := await reader.read(65_536):
@@ -109,7 +107,6 @@ async def test_slow_body_is_rejected_with_408(guarded: str, path: str) -> None:
 
 
 async def test_slow_request_head_is_closed_without_delaying_others(guarded: str) -> None:
-    begun = time.monotonic()
     slow_requests = [
         asyncio.create_task(send_raw(guarded, b"GET /v1/health HTTP/1.1\r\n", *[b"a"] * 1_000, interval_s=0.05))
     ]
@@ -117,7 +114,6 @@ async def test_slow_request_head_is_closed_without_delaying_others(guarded: str)
     async with httpx2.AsyncClient(base_url=guarded) as http:
         assert (await http.get("/v1/health")).status_code == 200
     assert await asyncio.gather(*slow_requests) == [b"", b""]
-    assert time.monotonic() - begun < TIMEOUT_S
 
 
 async def test_oversized_request_head_is_rejected(guarded: str) -> None:
@@ -162,7 +158,7 @@ async def test_invalid_token_is_rejected_before_the_body_is_read(guarded: str) -
 async def test_compressed_body_is_rejected(guarded: str, path: str, compressed: bytes) -> None:
     before = motion_count(guarded)
     options = {"Content-Encoding": "gzip", "Content-Type": "application/json", **bearer_headers(make_token())}
-    async with httpx2.AsyncClient(base_url=guarded, timeout=TIMEOUT_S) as http:
+    async with httpx2.AsyncClient(base_url=guarded, timeout=HANG_TIMEOUT_S) as http:
         response = await http.post(path, content=compressed, headers=options)
     assert 400 <= response.status_code < 500
     assert response.headers["content-type"] == "application/problem+json"
@@ -176,7 +172,7 @@ async def test_compressed_body_is_rejected(guarded: str, path: str, compressed: 
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/shares", "/v1/solve"])
 async def test_hostile_json_is_rejected_with_4xx(guarded: str, path: str, body: bytes) -> None:
     options = {"Content-Type": "application/json", **bearer_headers(make_token())}
-    async with httpx2.AsyncClient(base_url=guarded, timeout=TIMEOUT_S) as http:
+    async with httpx2.AsyncClient(base_url=guarded, timeout=HANG_TIMEOUT_S) as http:
         response = await http.post(path, content=body, headers=options)
     assert 400 <= response.status_code < 500
     json.loads(response.text)
@@ -217,7 +213,7 @@ async def test_websocket_from_a_foreign_origin_is_rejected(tmp_path: Path, origi
 
 @pytest.mark.parametrize("path", ["stream", "control"])
 async def test_oversized_frame_closes_with_1009(server: str, path: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=TIMEOUT_S) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = (await http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 8))).json()["id"]
         session = (await http.post("/v1/sessions", json={"motion": motion})).json()["id"]
     address = server.replace("http", "ws") + f"/v1/sessions/{session}/{path}"
@@ -231,7 +227,7 @@ async def test_oversized_frame_closes_with_1009(server: str, path: str) -> None:
 
 
 def test_motion_quota_is_counted_per_user(guarded: str) -> None:
-    with httpx2.Client(base_url=guarded, timeout=60) as http:
+    with httpx2.Client(base_url=guarded, timeout=HANG_TIMEOUT_S) as http:
         aiko, ben = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
         before = motion_count(guarded)
         created = [
@@ -253,7 +249,7 @@ def test_motion_quota_is_counted_per_user(guarded: str) -> None:
 
 
 def test_total_byte_quota_applies_without_a_secret(tmp_path: Path) -> None:
-    with run_server(tmp_path, total_bytes=9_000) as url, httpx2.Client(base_url=url, timeout=60) as http:
+    with run_server(tmp_path, total_bytes=9_000) as url, httpx2.Client(base_url=url, timeout=HANG_TIMEOUT_S) as http:
         responses = [
             http.post("/v1/motions?filename=a.bvh", content=make_bvh_clip(1.0, 60 + seed)) for seed in range(8)
         ]

@@ -10,6 +10,7 @@ import httpx2
 import pytest
 
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 VALID_BVH = make_bvh_clip(0.3)
 HEAD, FRAMES = VALID_BVH.split(b"MOTION", 1)
@@ -44,7 +45,7 @@ def leftover_sources() -> list[Path]:
 
 @pytest.mark.parametrize("name", MALFORMED_FILES)
 async def test_malformed_upload_is_rejected_with_hint_and_leaves_nothing(server: str, name: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         before = (await http.get("/v1/motions?limit=200")).json()
         response = await http.post("/v1/motions", params={"filename": f"{name}.bvh"}, content=MALFORMED_FILES[name]())
         assert response.status_code in (413, 422), response.text
@@ -67,7 +68,7 @@ async def test_line_of_a_gigabyte_is_rejected_early(server: str) -> None:
             sent_bytes += 1 << 20
             yield b"0" * (1 << 20)
 
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         try:
             assert (
                 await http.post("/v1/motions", params={"filename": "x.bvh"}, content=endless_line())
@@ -85,7 +86,7 @@ async def test_interrupted_upload_leaves_nothing(server: str) -> None:
         yield VALID_BVH[:1000]
         raise ClientGone
 
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         before = (await http.get("/v1/motions?limit=200")).json()
         with pytest.raises(ClientGone):
             await http.post("/v1/motions", params={"filename": "x.bvh"}, content=partial_upload())

@@ -18,6 +18,7 @@ from bunraku.messaging.bus import MemoryBus
 from bunraku.websocket import heartbeat
 from bunraku.wire.overlay import Overlay
 from tests.raw_client import upgrade_request
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def open_session(server: str, clip_file: Path) -> tuple[str, str]:
@@ -63,7 +64,7 @@ async def viewer_count(server: str, session: str) -> int:
 
 
 async def wait_for_viewer_count(server: str, session: str, number: int) -> None:
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while await viewer_count(server, session) != number:  # noqa: ASYNC110
             await asyncio.sleep(0.05)
 
@@ -84,7 +85,7 @@ async def test_viewer_that_stops_reading_skips_to_the_newest_overlay(
     await reading_viewers.join(3)
     await wait_for_viewer_count(server, session, 3)
     loop = asyncio.get_running_loop()
-    async with asyncio.timeout(90), open_raw_viewer(url, 4096) as stalled:
+    async with asyncio.timeout(HANG_TIMEOUT_S), open_raw_viewer(url, 4096) as stalled:
         await wait_for_viewer_count(server, session, 4)
         # overlays of the maximum size, more than a socket buffer holds, at the pace of a session
         frame: dict[int, tuple[int, ...]] = dict.fromkeys(range(4), (7,) * 9)
@@ -121,7 +122,7 @@ async def test_unresponsive_viewer_is_disconnected(
     reading_viewers = LoadGenerator(url, single_reporter=True)
     await reading_viewers.join(2)
     loop = asyncio.get_running_loop()
-    async with asyncio.timeout(60), open_raw_viewer(url) as silent:
+    async with asyncio.timeout(HANG_TIMEOUT_S), open_raw_viewer(url) as silent:
         await wait_for_viewer_count(server, session, 3)
         received = b""
         with contextlib.suppress(ConnectionError):
@@ -148,7 +149,7 @@ async def test_join_and_leave_burst_does_not_disturb_other_viewers(server: str, 
         await wait_for_viewer_count(server, session, 3)
         before = len(present.state.overlay_lateness)
         await puppeteer.target("left_hand", 0.45, -0.2, 0.5)
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while len(present.state.overlay_lateness) < before + 30:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
     assert not any(viewer.closed for viewer in present.viewers)

@@ -18,6 +18,7 @@ from bunraku.storage.catalogue import Catalogue
 from bunraku.websocket.subprotocol import UNAUTHORIZED, CloseConnection
 from tests.credentials import OTHER_SECRET, SECRET, make_token, sign_token
 from tests.processes import nats_url_of, run_jetstream
+from tests.time_limit import HANG_TIMEOUT_S
 
 HOST = Access(Role.CONTROL, "host")
 
@@ -165,7 +166,7 @@ async def test_revocation_reaches_all_replicas_even_after_a_bus_outage(tmp_path:
                 second.register_connection(
                     Access(Role.VIEW, expires=share.expires, share=share.id), reasons[-1].set_result
                 )
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 await first.revocations.revoke(shares[0].id)
                 assert (await reasons[0]).title == "Link revoked"
                 # a message published during the outage is lost; links are checked after reconnecting

@@ -16,8 +16,7 @@ from bunraku.http import protocol, request_body
 from bunraku.http.protocol import HttpLoad, HttpProtocol
 from bunraku.runtime import transport
 from tests.servers import run_server
-
-TIMEOUT_S = 120
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +35,7 @@ async def open_connection(url: str) -> tuple[asyncio.StreamReader, asyncio.Strea
 async def read_until_closed(reader: asyncio.StreamReader) -> bytes:
     """Return all data until the end of the connection."""
     received = b""
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with contextlib.suppress(ConnectionError):
             while more := await reader.read(65_536):
                 received += more
@@ -157,7 +156,7 @@ async def test_response_to_a_client_that_does_not_read_is_bounded(url: str, monk
     _, writer = await open_connection(url)
     # many responses to one client, which reads none of them
     request = b"GET /v1/openapi.json HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with contextlib.suppress(ConnectionError):
             while True:
                 writer.write(request)
@@ -253,7 +252,7 @@ async def test_address_that_fills_the_server_keeps_nobody_out(tmp_path: Path, mo
         held = [await asyncio.open_connection("127.0.0.1", port, local_addr=("127.0.0.2", 0)) for _ in range(60)]
         # the server closes what is beyond its capacity of 20
         ended = [asyncio.create_task(read_until_closed(reader)) for reader, _ in held]
-        async with asyncio.timeout(TIMEOUT_S):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while sum(task.done() for task in ended) < 40:  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         for _ in range(3):

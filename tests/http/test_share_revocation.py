@@ -27,6 +27,7 @@ from tests.disks import fill_disk, mount_small_disk
 from tests.processes import ServerProcess, run_postgres
 from tests.servers import run_server
 from tests.storage.conftest import create_database
+from tests.time_limit import HANG_TIMEOUT_S
 
 HOST = Access(Role.CONTROL, "aiko")
 
@@ -59,7 +60,7 @@ async def is_revoked(authenticator: Authenticator, token: str) -> bool:
 
 
 async def wait_until_removed(catalogue: Catalogue, share_id: str) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 if await catalogue.get_share(share_id) is None:
@@ -88,7 +89,7 @@ async def test_link_is_refused_by_all_replicas_although_its_row_stays(disk: Path
         # a replica that starts later receives the revocation, too, also after the first has failed
         first.close()
         late, _ = open_replica(stack, url, bus)
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not await is_revoked(late, token):  # noqa: ASYNC110
                 await asyncio.sleep(0.02)
         await asyncio.to_thread(filler.unlink)

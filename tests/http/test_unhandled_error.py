@@ -20,6 +20,7 @@ from bunraku.runtime.metrics import Metrics
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.disks import fill_disk, mount_small_disk, remount_read_only
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 def create_app() -> FastAPI:
@@ -121,7 +122,10 @@ def test_read_only_data_folder_is_a_503(tmp_path: Path, monkeypatch: pytest.Monk
         with run_server(disk / "data", secret=SECRET) as url:
             assert httpx2.get(f"{url}/v1/motions", headers=host).json()["items"] == []
         remount_read_only(disk)
-        with run_server(disk / "data", secret=SECRET) as url, httpx2.Client(base_url=url, timeout=100) as http:
+        with (
+            run_server(disk / "data", secret=SECRET) as url,
+            httpx2.Client(base_url=url, timeout=HANG_TIMEOUT_S) as http,
+        ):
             for temporary in (tempfile.gettempdir(), str(disk)):
                 monkeypatch.setattr(tempfile, "tempdir", temporary)
                 upload = http.post("/v1/motions?filename=a.bvh", headers=host, content=make_bvh_clip(0.5))
@@ -136,7 +140,7 @@ def test_full_temporary_folder_is_a_507(tmp_path: Path, monkeypatch: pytest.Monk
     with mount_small_disk(tmp_path / "disk") as disk, run_server(tmp_path / "data") as url:
         fill_disk(disk)
         monkeypatch.setattr(tempfile, "tempdir", str(disk))
-        response = httpx2.post(f"{url}/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5), timeout=100)
+        response = httpx2.post(f"{url}/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5), timeout=HANG_TIMEOUT_S)
         assert response.status_code == 507
         assert response.headers["content-type"] == "application/problem+json"
         assert [path.name for path in disk.iterdir()] == ["filler"]

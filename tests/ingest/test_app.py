@@ -9,15 +9,16 @@ import pytest
 
 from bunraku.runtime.display_text import clean_text
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def post(url: str, data: bytes, filename: str = "clip.bvh") -> httpx2.Response:
-    async with httpx2.AsyncClient(base_url=url, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
         return await http.post("/v1/motions", params={"filename": filename}, content=data)
 
 
 async def get(url: str, path: str) -> httpx2.Response:
-    async with httpx2.AsyncClient(base_url=url, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
         return await http.get(path)
 
 
@@ -119,7 +120,7 @@ async def test_oversized_upload_is_rejected_while_receiving(tmp_path: Path) -> N
                 sent += 4_000
                 yield b"0 " * 2_000
 
-        async with httpx2.AsyncClient(base_url=url, timeout=20) as http:
+        async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
             try:
                 response = await http.post("/v1/motions", params={"filename": "x.bvh"}, content=stream_body())
             except httpx2.TransportError:

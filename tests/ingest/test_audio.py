@@ -12,6 +12,7 @@ from bunraku.codec.motion_track import parse_motion_track
 from bunraku.wire.messages import Data, Description, unpack
 from tests.audio import AUDIO_FORMATS, decode_opus, find_onset, make_click, make_tone, write_audio
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def post_motion(http: httpx2.AsyncClient, seed: int = 7, seconds: float = 2.0) -> str:
@@ -37,7 +38,7 @@ async def get_audio_track(http: httpx2.AsyncClient, motion: str) -> tuple[AudioT
 @pytest.mark.parametrize("kind", AUDIO_FORMATS)
 async def test_sound_is_served_in_blocks_at_its_time(server: str, tmp_path: Path, kind: str) -> None:
     path = write_audio(tmp_path / f"song.{kind}", make_click(2.0, 48_000, 1.2, 2), 48_000, "stereo")
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = await post_motion(http)
         before = (await http.get(f"/v1/motions/{motion}")).json()
         response = await post_audio(http, motion, path.read_bytes(), path.name)
@@ -74,7 +75,7 @@ async def test_sound_is_served_in_blocks_at_its_time(server: str, tmp_path: Path
 
 async def test_original_motion_can_be_removed(server: str, tmp_path: Path) -> None:
     path = write_audio(tmp_path / "a.flac", make_tone(1.0, 44_100), 44_100)
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = await post_motion(http, 91)
         new = (await post_audio(http, motion, path.read_bytes())).json()["id"]
         assert (await http.delete(f"/v1/motions/{motion}")).status_code == 204
@@ -99,7 +100,7 @@ INVALID_FILES: dict[str, bytes] = {
 
 @pytest.mark.parametrize("name", INVALID_FILES)
 async def test_unreadable_sound_is_rejected_and_not_stored(server: str, name: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = await post_motion(http)
         before = (await http.get("/v1/motions?limit=200")).json()
         response = await post_audio(http, motion, INVALID_FILES[name])
@@ -115,7 +116,7 @@ async def test_unreadable_sound_is_rejected_and_not_stored(server: str, name: st
 
 
 async def test_invalid_request_gets_a_problem(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         assert (await post_audio(http, "none", b"x")).status_code == 404
         motion = await post_motion(http)
         unnamed = await http.post(f"/v1/motions/{motion}/audio", content=b"x")
@@ -125,11 +126,11 @@ async def test_invalid_request_gets_a_problem(server: str) -> None:
 async def test_upload_limits_apply_to_sound(tmp_path: Path) -> None:
     sound = write_audio(tmp_path / "a.wav", make_tone(2.0, 48_000), 48_000).read_bytes()
     with run_server(tmp_path / "small", upload_bytes=100_000) as url:
-        async with httpx2.AsyncClient(base_url=url, timeout=60) as http:
+        async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
             motion = await post_motion(http, seconds=0.5)
             assert (await post_audio(http, motion, bytes(100_001))).status_code == 413
     with run_server(tmp_path / "small", upload_seconds=0.001) as url:
-        async with httpx2.AsyncClient(base_url=url, timeout=60) as http:
+        async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
             response = await post_audio(http, motion, sound)
             assert (response.status_code, response.json()["title"]) == (422, "Takes too long")
             assert len((await http.get("/v1/motions")).json()["items"]) == 1
@@ -143,7 +144,7 @@ async def test_disconnect_while_sending_stores_nothing(server: str) -> None:
         yield b"RIFF"
         raise Disconnect
 
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = await post_motion(http)
         before = (await http.get("/v1/motions?limit=200")).json()
         with pytest.raises(Disconnect):

@@ -20,6 +20,7 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.storage.record import CatalogueEntry, Job
 from bunraku.storage.table import JOBS
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ async def count_jobs(context: ServiceContext) -> int:
 
 
 async def wait_for_job_count(expected: int, context: ServiceContext) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while await count_jobs(context) != expected:  # noqa: ASYNC110
             await asyncio.sleep(0.02)
 
@@ -81,7 +82,7 @@ async def is_empty(context: ServiceContext) -> bool:
 
 async def wait_until_empty(context: ServiceContext) -> None:
     await wait_for_job_count(0, context)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while not await is_empty(context):  # noqa: ASYNC110
             await asyncio.sleep(0.02)
 
@@ -132,7 +133,7 @@ async def test_abandoned_job_is_resumed_by_another_replica(
     if graceful:
         await failed.queue.release_jobs()
     other = QueueReplica(context)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await other.first_job_handled.wait()
     await wait_until_empty(context)
     assert other.handled_jobs == [({**DETAILS, "request_id": "upload-01"}, b"uploaded bytes")]
@@ -181,7 +182,7 @@ async def test_job_is_judged_by_the_observers_clock_alone(context: ServiceContex
     await holder.stop()
     await context.motion_store.put_source("j1", source)
     await context.catalogue.add_job(Job("j1", 1, DETAILS), "failed", ahead.clock() + TIMING.lease_us)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await other.first_job_handled.wait()
     await wait_until_empty(context)
     await other.stop()

@@ -7,6 +7,7 @@ from bunraku.client.api import Client
 from bunraku.ingest.performers import combined_ladder, combined_name
 from bunraku.wire.messages import Description, unpack
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def post_motion(http: httpx2.AsyncClient, seed: int, name: str = "dance") -> str:
@@ -16,7 +17,7 @@ async def post_motion(http: httpx2.AsyncClient, seed: int, name: str = "dance") 
 
 
 async def test_performers_are_added_in_a_new_motion(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         one, two = await post_motion(http, 81, "crane"), await post_motion(http, 82, "fox")
         before = (await http.get(f"/v1/motions/{one}")).json()
         response = await http.post(f"/v1/motions/{one}/performers", json={"motions": [two]})
@@ -44,7 +45,7 @@ async def test_performers_are_added_in_a_new_motion(server: str) -> None:
 
 
 async def test_invalid_request_names_its_field(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         one = await post_motion(http, 83)
         two = (await http.post(f"/v1/motions/{one}/performers", json={"motions": [one]})).json()["id"]
         for body, field in (
@@ -68,7 +69,7 @@ async def test_invalid_request_names_its_field(server: str) -> None:
 
 
 async def test_the_sdk_adds_performers(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http, Client(server) as client:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http, Client(server) as client:
         one = await post_motion(http, 84)
         assert (await client.add_performers(one, [one, one]))["performers"] == 3
         assert (await client.add_performers(one, [one], [[-1, 0, 0], [1, 0, 0]]))["performers"] == 2

@@ -10,6 +10,7 @@ import pytest
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.upload import MAX_UPLOADS_PER_HOLDER
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def poll_progress(
@@ -41,7 +42,7 @@ def test_stage_starts_with_share_zero() -> None:
 
 
 async def test_shares_rise_while_an_upload_is_encoded(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=120) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         posting = post(http, "upload-one", make_bvh_clip(12.0, 900))
         reports = await poll_progress(http, "upload-one", None, posting)
         assert (await posting).status_code == 201
@@ -59,7 +60,7 @@ async def test_shares_rise_while_an_upload_is_encoded(server: str) -> None:
 
 async def test_disconnect_cancels_the_upload(tmp_path: Path) -> None:
     with run_server(tmp_path) as url:
-        async with httpx2.AsyncClient(base_url=url, timeout=120) as http:
+        async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
             posting = post(http, "upload-two", make_bvh_clip(60.0, 901))
             await poll_progress(http, "upload-two", "encoding", posting)
             other = await post(http, "upload-two", make_bvh_clip(0.3))
@@ -79,7 +80,7 @@ async def test_disconnect_cancels_the_upload(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["short", "x" * 65, "with%20blank", "né-à-mesure"])
 async def test_invalid_upload_name_is_rejected(server: str, name: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         requested = await http.get(f"/v1/uploads/{name}")
         assert requested.status_code == 422
         assert requested.json()["field"] == "upload"

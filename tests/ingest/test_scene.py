@@ -5,6 +5,7 @@ import httpx2
 from bunraku.client.api import Client
 from bunraku.wire.messages import Description, unpack
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 CAMERA = [
     {"time": 0, "position": [0, 1, 4], "gaze": [0, 1, 0], "fov": 0.5},
@@ -20,7 +21,7 @@ async def post_motion(http: httpx2.AsyncClient, seed: int) -> str:
 
 
 async def test_scene_is_added_in_a_new_motion(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = await post_motion(http, 71)
         before = (await http.get(f"/v1/motions/{motion}")).json()
         response = await http.post(f"/v1/motions/{motion}/scene", json={"camera": CAMERA, "lights": [LIGHT, LIGHT]})
@@ -40,7 +41,7 @@ async def test_scene_is_added_in_a_new_motion(server: str) -> None:
 
 
 async def test_invalid_request_names_its_field(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
         motion = await post_motion(http, 72)
         for body, field in (
             ({"camera": [CAMERA[1], CAMERA[0]]}, "camera[1].time"),
@@ -55,6 +56,6 @@ async def test_invalid_request_names_its_field(server: str) -> None:
 
 
 async def test_the_sdk_adds_a_scene(server: str) -> None:
-    async with httpx2.AsyncClient(base_url=server, timeout=60) as http, Client(server) as client:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http, Client(server) as client:
         new = await client.add_scene(await post_motion(http, 73), {"lights": [LIGHT]})
         assert new["tracks"] == ["motion", "light"]

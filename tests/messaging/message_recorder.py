@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 
 from bunraku.messaging.bus import Bus
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class MessageRecorder:
@@ -20,7 +21,7 @@ class MessageRecorder:
 
     async def wait_for(self, last: bytes) -> list[bytes]:
         """Wait until `last` is the latest message and return all messages."""
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not self.messages or self.messages[-1] != last:
                 self._received.clear()
                 await self._received.wait()

@@ -12,6 +12,7 @@ from bunraku.messaging.bus import Bus, MemoryBus, NoResponse, ResponderFailed, i
 from bunraku.messaging.bus_nats import NatsBus
 from bunraku.runtime.availability import BackendUnavailable
 from tests.messaging.message_recorder import MessageRecorder, flush_buses
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture(params=["memory", "nats"])
@@ -124,7 +125,7 @@ async def test_failed_responder_is_reported_at_once(buses: tuple[Bus, Bus], capl
 
     bus.serve("broken", broken)
     await flush_buses(bus)
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with caplog.at_level(logging.CRITICAL, "bunraku.messaging.bus"), pytest.raises(ResponderFailed):
             await other.request("broken", timeout_s=3600)
         with pytest.raises(BackendUnavailable) as raised:
@@ -133,7 +134,7 @@ async def test_failed_responder_is_reported_at_once(buses: tuple[Bus, Bus], capl
 
 
 async def test_missing_responder_is_reported_at_once(buses: tuple[Bus, Bus]) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with pytest.raises(NoResponse):
             await buses[1].request("no.responder", timeout_s=3600)
 

@@ -18,6 +18,7 @@ from bunraku.messaging.nats_address import NatsServer, parse_servers
 from bunraku.runtime.availability import BackendUnavailable
 from tests.messaging.message_recorder import MessageRecorder, flush_buses
 from tests.processes import ServerProcess, nats_url_of, run_nats_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture
@@ -39,7 +40,7 @@ async def connect_buses(*urls: str, connect_timeout_s: float = 20) -> AsyncItera
 
 
 async def wait_until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 
@@ -72,7 +73,7 @@ async def test_subscriptions_are_restored_after_a_server_crash(server: ServerPro
         subscription.unsubscribe()
         assert not reconnected.is_set()
         server.start()
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await reconnected.wait()
         await wait_until(lambda: two.is_connected)
         assert await two.request("echo", b"2") == b"2"
@@ -167,7 +168,7 @@ async def test_bus_opens_without_a_server_and_connects_later(server: ServerProce
         with pytest.raises(BackendUnavailable):
             await bus.request("echo", b"0")
         server.start()
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await reconnected.wait()
         assert await bus.request("echo", b"1") == b"1"
 

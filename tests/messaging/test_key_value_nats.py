@@ -17,6 +17,7 @@ from bunraku.messaging.key_value_nats import NatsKeyValueStore
 from bunraku.messaging.nats_connection import NatsMessage
 from bunraku.runtime.availability import BackendUnavailable
 from tests.processes import ServerProcess, free_port, nats_url_of, run_jetstream, run_nats_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @asynccontextmanager
@@ -33,7 +34,7 @@ async def wait_until_connected(bus: NatsBus, server: ServerProcess) -> None:
     reconnected = asyncio.Event()
     subscription = bus.on_reconnect(reconnected.set)
     await asyncio.to_thread(server.start)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await reconnected.wait()
     subscription.unsubscribe()
 
@@ -78,12 +79,12 @@ async def test_suspended_server_is_unavailable_until_resumed(tmp_path: Path) -> 
             bus.on_reconnect(reconnected.set)
             server.pause()
             try:
-                async with asyncio.timeout(20):
+                async with asyncio.timeout(HANG_TIMEOUT_S):
                     with pytest.raises(BackendUnavailable):
                         await store.get("sessions.a")
             finally:
                 server.resume()
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 while not bus.is_connected:
                     reconnected.clear()
                     await reconnected.wait()
@@ -107,7 +108,7 @@ async def test_unreachable_server_is_unavailable() -> None:
 
 async def synchronised_keys(store: NatsKeyValueStore) -> dict[str, bytes]:
     """Return the values of a store's local copy once it contains everything."""
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 await store.synchronise()
@@ -168,7 +169,7 @@ async def test_watch_begins_again_after_a_missing_message(tmp_path: Path, monkey
 
             monkeypatch.setattr(bus, "on_message", drop_one)
             await store.put("sessions.b", b"2")
-            async with asyncio.timeout(20):
+            async with asyncio.timeout(HANG_TIMEOUT_S):
                 await dropped.wait()
                 # found by the next sign of life, or by the next change
                 await store.watch().wait_for(await store.put("sessions.c", b"3"), 20)

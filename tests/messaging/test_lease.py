@@ -9,6 +9,7 @@ from bunraku.messaging.key_value import MemoryKeyValueStore
 from bunraku.messaging.lease import hold_lease, wait_until_abandoned
 from bunraku.messaging.replica_registry import ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
+from tests.time_limit import HANG_TIMEOUT_S
 
 TIMING = ReplicaTiming(heartbeat_s=0.05, timeout_s=0.5)
 POLL_S = 0.01
@@ -28,7 +29,7 @@ async def test_holders_take_turns() -> None:
             finished.append(number)
             active -= 1
 
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await asyncio.gather(*map(work, range(5)))
     assert sorted(finished) == list(range(5))
     assert max_active == 1
@@ -42,7 +43,7 @@ async def test_held_lease_outlasts_its_timeout() -> None:
         with pytest.raises(TimeoutError):
             async with asyncio.timeout(1.5), hold_lease(store, "work", TIMING, POLL_S):
                 pytest.fail("two holders at once")
-    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S), hold_lease(store, "work", TIMING, POLL_S):
         pass
 
 
@@ -50,7 +51,7 @@ async def test_held_lease_outlasts_its_timeout() -> None:
 async def test_abandoned_lease_is_taken(holder: bytes) -> None:
     store = MemoryKeyValueStore()
     await store.put("work", holder, 0)
-    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S), hold_lease(store, "work", TIMING, POLL_S):
         entry = await store.get("work")
         assert entry is not None
         assert entry.value != holder
@@ -68,7 +69,7 @@ async def test_lease_whose_release_failed_ends_with_its_holder(monkeypatch: pyte
     async with hold_lease(store, "work", TIMING, POLL_S):
         monkeypatch.setattr(store, "remove", fail)
     assert await store.get("work") is not None
-    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S), hold_lease(store, "work", TIMING, POLL_S):
         pass
 
 
@@ -77,7 +78,7 @@ async def test_lease_of_a_stalled_holder_is_taken_after_the_timeout() -> None:
     holder = ReplicaRegistry(store, TIMING)
     await store.put("work", (await holder.register()).encode(), 0)
     begin = loop.time()
-    async with asyncio.timeout(20), hold_lease(store, "work", TIMING, POLL_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S), hold_lease(store, "work", TIMING, POLL_S):
         assert loop.time() - begin > TIMING.timeout_s
 
 

@@ -20,6 +20,7 @@ from bunraku.messaging.nats_connection import NatsConnection, NatsMessage
 from tests.certificates import Authority, CertificateFiles
 from tests.messaging.message_recorder import MessageRecorder
 from tests.processes import ServerProcess, run_nats_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 RUNNERS: dict[str, Callable[[Coroutine[Any, Any, None]], None]] = {"asyncio": asyncio.run, "uvloop": uvloop.run}
 
@@ -62,7 +63,7 @@ async def open_error(url: str) -> str:
 
 
 async def wait_until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 
@@ -198,7 +199,7 @@ async def run_plain_server(**info: object) -> AsyncIterator[PlainServer]:
     finally:
         listening.close()
         # the client closes every connection
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await asyncio.gather(*plain.connections)
 
 

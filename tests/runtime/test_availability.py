@@ -7,6 +7,7 @@ import time
 import pytest
 
 from bunraku.runtime.availability import BackendTimeout, BackendUnavailable
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def test_results_and_errors_are_passed_through() -> None:
@@ -58,7 +59,7 @@ async def test_cancelled_wait_cancels_the_call() -> None:
     waiting.cancel()
     with pytest.raises(asyncio.CancelledError):
         await waiting
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await cancelled.wait()
 
 

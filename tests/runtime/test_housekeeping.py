@@ -13,10 +13,11 @@ from bunraku.runtime.housekeeping import Housekeeping
 from bunraku.runtime.settings import Settings
 from bunraku.storage.motion_store import MotionStore
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def wait_until_gone(*paths: Path) -> None:
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while any(path.exists() for path in paths):  # noqa: ASYNC110
             await asyncio.sleep(0.02)
 
@@ -78,7 +79,7 @@ async def test_sweep_is_repeated_daily_and_after_failures(tmp_path: Path, monkey
                 await super().check_library()
 
         running = asyncio.create_task(Failing(context, has_library=True, clock=lambda: now).run(0.0))
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             for expected in (3, 4, 5):
                 while len(checks) < expected:  # noqa: ASYNC110
                     await asyncio.sleep(0.001)
@@ -91,9 +92,11 @@ async def test_sweep_is_repeated_daily_and_after_failures(tmp_path: Path, monkey
 
 def test_server_hides_a_motion_whose_object_was_lost(tmp_path: Path) -> None:
     with run_server(tmp_path) as url:
-        stored = httpx2.post(f"{url}/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5), timeout=100).json()
+        stored = httpx2.post(
+            f"{url}/v1/motions?filename=a.bvh", content=make_bvh_clip(0.5), timeout=HANG_TIMEOUT_S
+        ).json()
     (tmp_path / f"library/motions/{stored['id']}.bunraku").unlink()
-    with run_server(tmp_path) as url, httpx2.Client(base_url=url, timeout=100) as http:
+    with run_server(tmp_path) as url, httpx2.Client(base_url=url, timeout=HANG_TIMEOUT_S) as http:
         while http.get("/v1/motions").json()["items"]:
             pass
         assert http.get(f"/v1/motions/{stored['id']}").status_code == 404

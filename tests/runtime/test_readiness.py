@@ -18,6 +18,7 @@ from bunraku.runtime.context import open_context
 from bunraku.runtime.readiness import Dependency, Readiness
 from bunraku.runtime.settings import Settings
 from tests.processes import ServerProcess, nats_url_of, run_jetstream, run_postgres
+from tests.time_limit import HANG_TIMEOUT_S
 
 ALL: tuple[Dependency, ...] = ("bus", "register", "catalogue", "library")
 
@@ -62,7 +63,7 @@ async def list_unavailable(http: httpx2.AsyncClient) -> list[str]:
 
 
 async def wait_until_unavailable(http: httpx2.AsyncClient, expected: set[str]) -> None:
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while set(await list_unavailable(http)) != expected:  # noqa: ASYNC110
             await asyncio.sleep(0.05)
 

@@ -8,6 +8,7 @@ import pytest
 
 from bunraku.runtime import transport
 from bunraku.runtime.transport import LingeringClose, WriteDeadline, unsent_bytes
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class Sender(asyncio.Protocol):
@@ -50,7 +51,7 @@ async def test_client_that_never_reads_is_aborted(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(transport, "WRITE_WINDOW_S", 0.05)
     sender = Sender()
     with contextlib.closing(await connect_to(sender)):
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await sender.ended.wait()
 
 
@@ -59,12 +60,12 @@ async def test_client_that_reads_gets_everything(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(transport, "WRITE_WINDOW_S", 5.0)
     loop, sender, received = asyncio.get_running_loop(), Sender(), 0
     with contextlib.closing(await connect_to(sender)) as client:
-        async with asyncio.timeout(60):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while received < (16 << 20) + 3:
                 received += len(await loop.sock_recv(client, 1 << 20))
         assert unsent_bytes(sender.transport) >= 0
         assert not sender.ended.is_set()
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await sender.ended.wait()
 
 
@@ -86,10 +87,10 @@ class Rejecter(asyncio.Protocol):
 async def test_rejected_client_reads_the_reason_while_it_sends() -> None:
     loop, rejecter = asyncio.get_running_loop(), Rejecter()
     with contextlib.closing(await connect_to(rejecter)) as client:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await loop.sock_sendall(client, bytes(100_000))
             assert await loop.sock_recv(client, 100) == b"no"
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await rejecter.ended.wait()
 
 
@@ -97,6 +98,6 @@ async def test_rejected_client_that_stays_is_aborted(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(transport, "LINGER_S", 0.05)
     loop, rejecter = asyncio.get_running_loop(), Rejecter()
     with contextlib.closing(await connect_to(rejecter)) as client:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await loop.sock_sendall(client, b"hello")
             await rejecter.ended.wait()

@@ -10,6 +10,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bunraku.client import Client, ControlRefused, Puppeteer
 from bunraku.wire.messages import SUBPROTOCOL, Claim, Grant, Input, Ping, Pong, Problem, Refusal, Welcome, unpack
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ async def test_limb_is_granted_to_the_first_claim_until_released(server: str, se
             await aiko.release("left_hand")
             await yuki.claim("left_hand")
         # a disconnect releases the limbs
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while any((await client.session(session))["limbs"]):  # noqa: ASYNC110
                 await asyncio.sleep(0.01)
         await aiko.claim("left_hand")
@@ -51,7 +52,7 @@ async def test_silent_holder_loses_the_limb(server: str, session: str) -> None:
     async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as silent:  # type: ignore[list-item]
         await silent.send(Claim(1).pack())
         kinds = []
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not isinstance(message := unpack(await silent.recv(decode=False)), Refusal):
                 kinds.append(type(message))
     assert kinds[0] is Welcome
@@ -64,7 +65,7 @@ async def test_input_without_the_limb_is_ignored_and_ping_is_answered(server: st
     async with connect(url, subprotocols=[SUBPROTOCOL], compression=None) as socket:  # type: ignore[list-item]
         await socket.send(Input(0, Input.TARGET, 99, 1, 0, (1, 1, 1)).pack())
         await socket.send(Ping(3, 4).pack())
-        async with asyncio.timeout(5):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not isinstance(message := unpack(await socket.recv(decode=False)), Pong):
                 continue
     assert (message.sequence, message.sent) == (3, 4)

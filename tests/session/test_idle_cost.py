@@ -17,6 +17,7 @@ from bunraku.runtime.settings import Settings
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.session_registry import SessionRecord, session_key
 from tests.processes import nats_url_of, run_jetstream
+from tests.time_limit import HANG_TIMEOUT_S
 
 SESSIONS, REPLICAS, HEARTBEATS = 1_000, 4, 4
 
@@ -82,7 +83,7 @@ async def test_idle_replicas_send_one_request_per_heartbeat(
         await manager._registry.replicas.register()
         assert len(manager._registry.sessions) == SESSIONS
     measured = [(manager, HeartbeatCount(manager), counts, counts.total()) for manager, counts in replicas[1:]]
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         for _, sent, _, _ in measured:
             await sent.wait_for(HEARTBEATS)
     requests = sum(counts.total() - before for _, _, counts, before in measured)

@@ -19,6 +19,7 @@ from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import Claim, Grant, Presence, TimelineState, Welcome, unpack
 from bunraku.wire.overlay import Overlay
 from tests.session.recording_puppeteer import RecordingPuppeteer
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 
 MOTIONS = ("one", "two")
@@ -78,7 +79,7 @@ class SessionMessages:
         self._more.set()
 
     async def wait_for(self, kind: type) -> object:
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while not (found := [m for m in self.messages if isinstance(m, kind)]):
                 self._more.clear()
                 await self._more.wait()
@@ -218,7 +219,7 @@ async def test_session_of_a_removed_motion_ends_with_its_replica(
     opened = await dead.sessions.open_session("one")
     await context.motion_store.remove("one")
     await dead.kill()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while await context.key_values.get(f"sessions.{opened['id']}") is not None:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
     with pytest.raises(ProblemError) as ended:
@@ -243,11 +244,11 @@ async def test_outage_of_the_key_value_store_moves_no_session(
         raise ConnectionError("unavailable")
 
     monkeypatch.setattr(context.key_values, "put", fail)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await refused.wait()
     monkeypatch.setattr(context.key_values, "put", put)
     revisions: set[int] = set()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while len(revisions) < 10:
             entries = context.key_values.watch().entries
             revisions |= {entry.revision for key, entry in entries.items() if key.startswith("replicas.")}

@@ -22,6 +22,7 @@ from bunraku.session.schema import SessionEdit
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.session_registry import SessionRecord, session_key
 from tests.session.remote_store import RemoteKeyValueStore
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 
 TIMING = ReplicaTiming(heartbeat_s=0.05, timeout_s=0.4)
@@ -55,7 +56,7 @@ class Replica:
         """Wait until the server has got `number` more heartbeats."""
         key = self.sessions._registry.replicas.key
         seen: set[int] = set()
-        async with asyncio.timeout(20):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while len(seen) <= number:
                 entry = await self.store.server.get(key)
                 seen |= {entry.revision} if entry else set()
@@ -89,7 +90,7 @@ async def start(context: ServiceContext, server: MemoryKeyValueStore) -> AsyncIt
 
 
 async def wait_until(condition: Callable[[], bool]) -> None:
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while not condition():  # noqa: ASYNC110
             await asyncio.sleep(0.005)
 
@@ -210,7 +211,7 @@ async def test_session_that_ends_during_its_takeover_stays_away(
 
     monkeypatch.setattr(context.motion_store, "get", load_late)
     await dead.stop()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await loading.wait()
     with pytest.raises(ProblemError) as unavailable:
         await one.sessions.stage_proxy(session).end()
@@ -242,7 +243,7 @@ async def test_stage_of_a_lost_session_is_closed_though_its_answer_is_late(
 
     owner.store.put = put_and_answer_late  # type: ignore[method-assign]
     opening = asyncio.create_task(owner.sessions.open_session("one", session="s"))
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while await server.get("sessions.s") is None:  # noqa: ASYNC110
             await asyncio.sleep(0.005)
     entry = await server.get("sessions.s")
@@ -302,7 +303,7 @@ async def test_random_faults_leave_one_stage_for_each_record(
     await asyncio.sleep(0.15)
     killed = living.pop()
     await killed.stop()
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await using
     for replica in living:
         replica.store.loss = 0.0

@@ -51,6 +51,7 @@ from bunraku.wire.messages import (
 )
 from bunraku.wire.overlay import Overlay
 from tests.ingest.jobs.motions import MOTIONS
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 
 
@@ -68,7 +69,7 @@ class StageMessages:
         self._more.set()
 
     async def wait_for(self, number: int, kind: type) -> list[object]:
-        async with asyncio.timeout(10):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             while len(found := [m for m in self.messages if isinstance(m, kind)]) < number:
                 self._more.clear()
                 await self._more.wait()
@@ -271,7 +272,7 @@ async def test_flood_of_changes_is_published_at_a_limited_rate(stage: Stage, bus
     presences = [m for m in audience.messages if isinstance(m, Presence)]
     assert len(presences) < 2 * PRESENCE_BURST
     # the last change is published too
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while presences[-1].limbs != stage.presence.limbs:
             presences = [m for m in audience.messages if isinstance(m, Presence)]
             await asyncio.sleep(0.01)

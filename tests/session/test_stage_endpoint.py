@@ -21,6 +21,7 @@ from bunraku.session.stage_proxy import StageProxy
 from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
 from bunraku.wire.messages import Claim, TimelineState
 from tests.session.recording_puppeteer import RecordingPuppeteer
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 
 
@@ -133,7 +134,7 @@ async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, e
     for puppeteer in endpoint.stage.puppeteers:
         if puppeteer.id == dead.id:
             puppeteer.last_heard_us -= stage_endpoint.PUPPETEER_TIMEOUT_US
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while not dead.is_unknown:
             dead.has_messages.clear()
             await dead.has_messages.wait()
@@ -156,7 +157,7 @@ async def test_viewers_of_a_dead_stream_replica_no_longer_count(
     stage, dead = StageProxy("s", context.bus, context.key_values), msgpack.packb(["dead", 3])
     context.bus.publish("session.s.viewers", dead)
     assert (await stage.describe())["viewers"] == 3
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while (await stage.describe())["viewers"] != 2:
             context.bus.publish("session.s.viewers", msgpack.packb(["living", 2]))
             await asyncio.sleep(0.01)

@@ -17,6 +17,7 @@ from bunraku.storage.catalogue import Catalogue
 from bunraku.storage.record import CatalogueEntry
 from tests.processes import ServerProcess
 from tests.storage.conftest import create_database
+from tests.time_limit import HANG_TIMEOUT_S
 
 ENTRY = CatalogueEntry("m1", 1, {"name": "a dance"})
 
@@ -38,7 +39,7 @@ async def catalogue(server: ServerProcess) -> AsyncIterator[Catalogue]:
 
 
 async def assert_unavailable(catalogue: Catalogue) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with pytest.raises(BackendUnavailable, match="catalogue"):
             await catalogue.add_motion(CatalogueEntry("m2", 2, {}))
         with pytest.raises(BackendUnavailable):
@@ -50,7 +51,7 @@ async def assert_unavailable(catalogue: Catalogue) -> None:
 
 
 async def wait_until_available(catalogue: Catalogue) -> None:
-    async with asyncio.timeout(30):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while True:
             try:
                 assert await catalogue.get_motion("m1") == ENTRY
@@ -74,7 +75,7 @@ async def test_suspended_server_is_unavailable_until_resumed(server: ServerProce
     await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(3)))
     server.pause()
     try:
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             outcomes = await asyncio.gather(*(catalogue.get_motion("m1") for _ in range(30)), return_exceptions=True)
     finally:
         server.resume()

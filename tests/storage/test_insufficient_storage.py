@@ -26,6 +26,7 @@ from bunraku.storage.record import CatalogueEntry
 from tests.disks import fill_disk, mount_small_disk
 from tests.processes import ServerProcess
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture
@@ -65,7 +66,7 @@ async def test_failed_put_keeps_the_previous_object(small: Path) -> None:
 
 async def test_upload_to_a_full_disk_leaves_stored_motions_intact(small: Path, tmp_path: Path) -> None:
     with run_server(tmp_path / "data", library=f"file://{small}") as url:
-        async with httpx2.AsyncClient(base_url=url, timeout=60.0) as http:
+        async with httpx2.AsyncClient(base_url=url, timeout=HANG_TIMEOUT_S) as http:
             stored = await http.post("/v1/motions", params={"filename": "a.bvh"}, content=make_bvh_clip(1.0, 1))
             assert stored.status_code == 201
             filler = small / "filler"

@@ -22,6 +22,7 @@ from bunraku.storage.migration import HEAD_REVISION, UnknownSchemaVersion, read_
 from bunraku.storage.record import CatalogueEntry
 from bunraku.storage.table import METADATA
 from tests.conftest import REPOSITORY
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def run_in_connection(url: str, function: Any) -> Any:
@@ -100,7 +101,7 @@ async def test_ten_replicas_open_a_new_catalogue_at_once(url: str) -> None:
         capture_output=True,
         text=True,
         cwd=REPOSITORY,
-        timeout=100,
+        timeout=HANG_TIMEOUT_S,
     )
     assert completed.stdout.splitlines() == ["OK"] * 10, completed.stderr
     catalogue = await SqlCatalogue.open(url)

@@ -15,6 +15,7 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.storage.object_folder import COPY_CHUNK_BYTES, TEMPORARY_MARK, ObjectFolder
 from bunraku.storage.object_storage import ObjectStorage
 from tests.processes import find_program
+from tests.time_limit import HANG_TIMEOUT_S
 
 STORE_MOTION = """
 import asyncio, sys
@@ -42,7 +43,7 @@ def test_object_and_row_are_on_the_disk_before_the_answer(tmp_path: Path) -> Non
     trace, data = tmp_path / "trace", tmp_path / "data"
     calls = "trace=fsync,fdatasync,rename,renameat,renameat2,unlink,unlinkat,stat,newfstatat,statx,mkdir,mkdirat"
     command = [find_program("strace"), "-f", "-y", "-qq", "-o", str(trace), "-e", calls, sys.executable, "-c"]
-    subprocess.run([*command, STORE_MOTION, str(data)], check=True, timeout=100)
+    subprocess.run([*command, STORE_MOTION, str(data)], check=True, timeout=HANG_TIMEOUT_S)
     lines = trace.read_text().splitlines()
     begin = next(index for index, line in enumerate(lines) if '"/begin"' in line)
     end = next(index for index, line in enumerate(lines) if '"/answer"' in line)

@@ -28,6 +28,7 @@ from bunraku.wire.messages import (
     unpack,
 )
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
@@ -36,7 +37,7 @@ def socket(server: str, path: str, protocol: str = SUBPROTOCOL) -> connect:
 
 
 async def message(connection: ClientConnection) -> Message | None:
-    data = await asyncio.wait_for(connection.recv(), 10)
+    data = await asyncio.wait_for(connection.recv(), HANG_TIMEOUT_S)
     assert isinstance(data, bytes)
     return unpack(data)
 

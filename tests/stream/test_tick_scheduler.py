@@ -4,6 +4,7 @@ import asyncio
 
 from bunraku.runtime.clock import clock
 from bunraku.stream.tick_scheduler import MAX_BATCH, TickScheduler
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class CountingItem:
@@ -28,7 +29,7 @@ async def test_ticks_repeat_and_are_never_early() -> None:
     items = [CountingItem(scheduler, repeats=3) for _ in range(3 * MAX_BATCH)]
     for nth, item in enumerate(items):
         scheduler.schedule(item, now + nth * 300)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         for item in items:
             await item.done.wait()
     assert all(item.times[0] >= now + nth * 300 for nth, item in enumerate(items))
@@ -42,7 +43,7 @@ async def test_earlier_tick_resets_timer_and_cancelled_item_has_no_tick() -> Non
     scheduler.schedule(cancelled, clock() + 2_000)
     scheduler.schedule(near, clock() + 5_000)
     scheduler.cancel(cancelled)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await near.done.wait()
     assert far.times == cancelled.times == []
 
@@ -66,7 +67,7 @@ async def test_other_callbacks_run_between_batches() -> None:
             asyncio.get_running_loop().call_soon(run_other)
 
     run_other()
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         for item in items:
             await item.done.wait()
     assert "other" in order[order.index("tick") : len(order) - order[::-1].index("tick")]

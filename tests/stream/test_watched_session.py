@@ -23,6 +23,7 @@ from bunraku.websocket.subprotocol import NOT_FOUND, CloseConnection
 from bunraku.wire.messages import Presence, Problem, TimelineState
 from bunraku.wire.overlay import Overlay
 from tests.stream.fake_transport import FakeTransport, parse_frames
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 
 STATE = timeline.start("m", 2_000_000, 1_000)
@@ -119,7 +120,7 @@ async def test_viewer_counts_are_throttled(motion_store: MotionStore, monkeypatc
     watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     joined = [await join_viewer(watched) for _ in range(40)]
     assert len(counts) < 20
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while counts[-1] != 40:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
     for viewer, _ in joined:
@@ -136,7 +137,7 @@ async def test_unchanged_viewer_count_is_published_again(
     watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
     viewer, _ = await join_viewer(watched)
     session = watched._sessions["s"]
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while counts[-4:] != [1] * 4:  # noqa: ASYNC110
             await asyncio.sleep(0.001)
     viewer.on_close()

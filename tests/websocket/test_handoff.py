@@ -24,6 +24,7 @@ from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.handoff import HandoffProtocol, detach, reject
 from bunraku.websocket.subprotocol import CloseConnection
 from tests.raw_client import client_frame, open_raw, upgrade_request
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class RecordingListener:
@@ -67,7 +68,7 @@ async def serve_app(endpoint: Callable[[WebSocket], Awaitable[None]]) -> AsyncIt
     server = uvicorn.Server(config)
     with socket.create_server(("127.0.0.1", 0)) as listening:
         serving = asyncio.create_task(server.serve(sockets=[listening]))
-        async with asyncio.timeout(30):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             yield f"ws://127.0.0.1:{listening.getsockname()[1]}/", server
             server.should_exit = True
             await serving

@@ -11,6 +11,7 @@ from starlette.websockets import WebSocket
 from bunraku.websocket.frame import Opcode
 from bunraku.websocket.link import LINK_EXTENSION, UNKNOWN_RTT_US, AckedLink, TcpLink, link_of
 from tests.stream.fake_transport import parse_frames
+from tests.time_limit import HANG_TIMEOUT_S
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="the state of TCP connections is available on Linux only"
@@ -46,7 +47,7 @@ async def test_sample_counts_unacknowledged_bytes(pair: TransportPair) -> None:
     remaining = size
     while remaining:
         remaining -= len(await asyncio.to_thread(client.recv, 1 << 20))
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while link.sample().unacked_bytes:  # noqa: ASYNC110
             await asyncio.sleep(0)
     after = link.sample()
@@ -59,7 +60,7 @@ async def test_closed_socket_raises_on_sample_but_not_on_options(pair: Transport
     transport, _ = pair
     link = TcpLink(transport)
     transport.abort()
-    async with asyncio.timeout(10):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while transport.get_extra_info("socket").fileno() >= 0:  # noqa: ASYNC110
             await asyncio.sleep(0)
     with pytest.raises(OSError, match="closed"):

@@ -19,6 +19,7 @@ from bunraku.websocket.multicast import (
     MulticastGroup,
     MulticastSender,
 )
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 class SilentListener:
@@ -82,7 +83,7 @@ async def test_all_connections_receive_the_same_bytes(sender: MulticastSender, n
     is_compiled = sender is not PLAIN_SENDER and number > MAX_PLAIN_GROUP
     assert group.write(b"one") == (3 * number if is_compiled else 0)
     group.write(b"and another")
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         assert [await read_bytes(client, 14) for client in clients] == [b"oneand another"] * number
     await close_all(connections, clients)
 
@@ -97,7 +98,7 @@ async def test_bytes_that_a_socket_does_not_accept_are_sent_later(sender: Multic
             if client is not blocked:
                 await read_bytes(client, len(block))
 
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while connections[7].is_writable:
             MulticastGroup(connections, sender).write(block)
             block_count += 1
@@ -118,7 +119,7 @@ async def test_broken_connection_ends_and_the_others_receive(sender: MulticastSe
     connections[3]._listener = CloseListener()
     clients[3].close()
     MulticastGroup(connections, sender).write(b"to all")
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         for index, client in enumerate(clients):
             if index != 3:
                 assert await read_bytes(client, 6) == b"to all"
@@ -159,7 +160,7 @@ async def test_lazy_sender_is_plain_until_loaded() -> None:
     assert MulticastGroup(connections, lazy).write(b"plain") == 0
     lazy.load()
     assert MulticastGroup(connections, lazy).write(b"compiled") == 8 * len(connections)
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         assert [await read_bytes(client, 13) for client in clients] == [b"plaincompiled"] * len(clients)
     await close_all(connections, clients)
 
