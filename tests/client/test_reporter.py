@@ -20,7 +20,7 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class MessageRecorder:
-    """What was said, one after the other."""
+    """Messages in the order of their sending."""
 
     def __init__(self) -> None:
         self._queue: asyncio.Queue[bytes] = asyncio.Queue()
@@ -57,7 +57,7 @@ async def running_reporter() -> AsyncIterator[tuple[ViewerReporter, MessageRecor
 
 
 async def run_event_loop() -> None:
-    """So many turns of the loop that what is not held back would have been said."""
+    """Run enough iterations of the event loop for every message that is not withheld to be sent."""
     for _ in range(50):
         await asyncio.sleep(0)
 

@@ -176,8 +176,11 @@ def test_a_stream_without_a_dance_says_so() -> None:
 
 
 class CuttingProxy:
-    """Stands before a stream, `behind` it: knows the queries of those who come and what they were sent, and can cut
-    their lines; the numbers in `refused` are told to come again."""
+    """Proxy of the stream at `behind`.
+
+    It records the queries of viewers and the messages sent to them, and can cut their connections. Viewers whose
+    numbers are in `refused` are asked to retry.
+    """
 
     def __init__(self, behind: str, *refused: int) -> None:
         self.upstream_url = behind
@@ -214,7 +217,7 @@ class CuttingProxy:
 
     @asynccontextmanager
     async def open(self, query: str = "") -> AsyncIterator[Viewer]:
-        """A viewer who comes through it."""
+        """Connect a viewer through the proxy."""
         async with serve(self, "127.0.0.1", 0, subprotocols=[PROTOCOL], compression=None) as opened:
             port = next(iter(opened.sockets)).getsockname()[1]
             yield Viewer(f"ws://127.0.0.1:{port}/{query}")

@@ -17,7 +17,7 @@ def motion() -> Motion:
 
 
 def position_in_chest(motion: Motion, frame: int, joint: str) -> Array:
-    """Where a joint is from the left or right shoulder, along the axes of the chest."""
+    """Return the position of a joint relative to the shoulder of its side, along the axes of the chest."""
     position, orientation = skeleton.world_transforms(motion.figure, motion.root[frame], motion.rotations[frame])
     chest = rotation.conjugate(orientation[JOINT_INDEX["vl5"]])
     return rotation.rotate(chest, position[JOINT_INDEX[joint]] - position[JOINT_INDEX[f"{joint[0]}_shoulder"]])

@@ -1,4 +1,4 @@
-"""What a dance must hold, measured on the made motion itself."""
+"""Requirements on the demo dance, measured on the generated motion."""
 
 import numpy as np
 import numpy.typing as npt

@@ -39,5 +39,5 @@ def test_raised_arm_lifts_the_centre_of_mass() -> None:
     raised = REST.copy()
     raised[JOINT_INDEX["l_shoulder"]] = rotation.from_coordinate_axis(2, np.array(np.pi))
     rise = posed_centre_of_mass(raised)[1] - posed_centre_of_mass(REST)[1]
-    # twice the arm's 5 per cent, times the way of its own centre from the shoulder: 27 to 35 cm
+    # twice the arm's 5 per cent, times the distance of the arm's centre from the shoulder: 27 to 35 cm
     assert 0.05 * 2 * 0.27 < rise < 0.05 * 2 * 0.35

@@ -41,7 +41,7 @@ def test_end_reaches_target_and_hinge_points_to_pole(
     turned, bend = two_bone_ik.solve_two_bone(upper, lower, target[None], pole[None], hinge)
     assert np.allclose(end_positions(upper, lower, turned, bend, hinge), target, rtol=0, atol=1e-9)
     assert 0.0 <= bend[0] <= np.radians(150.0) + 1e-6
-    # the hinge is on the pole's side of the line to the target
+    # the hinge is on the pole's side of the straight path to the target
     beside = pole - target * (pole @ target) / (target @ target)
     assert rotation.rotate(turned[0], upper) @ beside > 0.0
 

@@ -243,6 +243,6 @@ def test_services_know_whether_the_gateway_is_published() -> None:
         environment = SERVICES[name]["environment"]
         assert environment["BUNRAKU_PUBLISHED"] == "${BUNRAKU_ADDRESS:-127.0.0.1}"
         assert environment["BUNRAKU_SECRET"] == "${BUNRAKU_SECRET:-}"
-        # only the gateway reaches them; proxies in front of it are those of its own setting
+        # only the gateway connects to the services; a setting of the gateway lists the proxies in front of it
         assert environment["BUNRAKU_TRUSTED_PROXIES"] == f"* {SERVICES['gateway']['environment']['BUNRAKU_PROXIES']}"
         assert "ports" not in SERVICES[name]

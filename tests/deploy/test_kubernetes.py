@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import re
-import ssl
 import subprocess
 from pathlib import Path
 from typing import Any
@@ -13,11 +11,10 @@ import kubernetes_validate
 import pytest
 import yaml
 
-from bunraku.runtime.tls import create_client_context
 from bunraku.serve import SERVICES
 from tests.conftest import REPOSITORY
-from tests.deploy.manifests import KUBERNETES, OVERLAYS, RenderedOverlay, find_kubectl, render_overlay
-from tests.deploy.test_compose import DOCKERFILE, OWN_IMAGES, exchange_handshake
+from tests.deploy.manifests import OVERLAYS, RenderedOverlay, find_kubectl, render_overlay
+from tests.deploy.test_compose import DOCKERFILE, OWN_IMAGES
 from tests.deploy.test_compose import SERVICES as ALL_COMPOSE_SERVICES
 from tests.deploy.test_gateway import read_handles
 
@@ -45,21 +42,6 @@ KUBERNETES_ONLY = {
 }
 """Variables set by Kubernetes only, and the reason."""
 MEBIBYTES_PER_UNIT = {"m": 1, "g": 1024, "Mi": 1, "Gi": 1024}
-
-
-@pytest.fixture(scope="module", params=OVERLAYS)
-def rendered(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> RenderedOverlay:
-    return RenderedOverlay(render_overlay(tmp_path_factory.mktemp("built"), request.param))
-
-
-@pytest.fixture(scope="module")
-def laptop(tmp_path_factory: pytest.TempPathFactory) -> RenderedOverlay:
-    return RenderedOverlay(render_overlay(tmp_path_factory.mktemp("laptop"), "laptop"))
-
-
-@pytest.fixture(scope="module")
-def cluster(tmp_path_factory: pytest.TempPathFactory) -> RenderedOverlay:
-    return RenderedOverlay(render_overlay(tmp_path_factory.mktemp("cluster"), "cluster"))
 
 
 def mebibytes(size: str) -> int:
@@ -180,30 +162,6 @@ def test_volumes_and_memory_folders_equal_compose(laptop: RenderedOverlay) -> No
         assert memory_mounts == expected_memory
 
 
-def test_container_has_least_privileges(rendered: RenderedOverlay) -> None:
-    level = "pod-security.kubernetes.io/enforce"
-    assert rendered.of("Namespace")["bunraku"]["metadata"]["labels"][level] == "restricted"
-    for name, pod in rendered.pods().items():
-        assert pod["automountServiceAccountToken"] is False, name
-        assert pod["enableServiceLinks"] is False
-        security_context = pod["securityContext"]
-        assert security_context["runAsNonRoot"] is True
-        assert security_context["runAsUser"] > 0
-        assert security_context["seccompProfile"] == {"type": "RuntimeDefault"}
-        assert not {"hostNetwork", "hostPID", "hostIPC"} & set(pod)
-        assert all("hostPath" not in volume for volume in pod.get("volumes", ()))
-    for name, container in rendered.containers():
-        expected_context = {
-            "allowPrivilegeEscalation": False,
-            "readOnlyRootFilesystem": True,
-            "capabilities": {"drop": ["ALL"]},
-        }
-        assert container["securityContext"] == expected_context, name
-        assert {*container["resources"]["requests"]} == {"cpu", "memory"}
-        assert {*container["resources"]["limits"]} == {"memory"}
-        assert all("hostPort" not in port for port in container["ports"])
-
-
 def test_every_probe_path_exists(rendered: RenderedOverlay) -> None:
     source = (REPOSITORY / "services" / "bunraku" / "runtime" / "readiness.py").read_text()
     for name, container in rendered.containers():
@@ -239,165 +197,6 @@ def test_services_are_headless_for_the_gateway(rendered: RenderedOverlay) -> Non
         assert f"@{name}:{port}" in " ".join(COMPOSE_SERVICES["stream"]["environment"].values())
         assert port in {one["port"] for one in services[name]["spec"]["ports"]}
         assert services[name]["spec"]["clusterIP"] == "None"
-
-
-def test_only_the_gateway_is_reachable_from_outside(rendered: RenderedOverlay) -> None:
-    kinds = {name: one["spec"].get("type", "ClusterIP") for name, one in rendered.of("Service").items()}
-    assert {name for name, kind in kinds.items() if kind != "ClusterIP"} <= {"gateway"}
-    policies = {name: one["spec"] for name, one in rendered.of("NetworkPolicy").items()}
-    assert policies["nobody"] == {"podSelector": {}, "policyTypes": ["Ingress", "Egress"]}
-    open_to_all = {name for name, one in policies.items() for rule in one.get("ingress", ()) if "from" not in rule}
-    assert open_to_all == {"gateway"}
-    for name in ("nats", "postgres"):
-        assert policies[name]["podSelector"] == {"matchLabels": {"app.kubernetes.io/name": name}}
-        assert "Egress" in policies[name]["policyTypes"]
-    for one in policies.values():
-        for rule in one.get("ingress", ()):
-            for port in rule.get("ports", ()):
-                selected = one["podSelector"]["matchLabels"].items()
-                pods = [
-                    workload["spec"]["template"]
-                    for workload in rendered.of("Deployment", "StatefulSet").values()
-                    if selected <= workload["spec"]["template"]["metadata"]["labels"].items()
-                ]
-                assert pods
-                for pod in pods:
-                    assert port["port"] in {named["name"] for named in pod["spec"]["containers"][0]["ports"]}
-
-
-def egress_peers(policies: dict[str, Any], name: str) -> set[tuple[str, int | str]]:
-    """Return the pods and ports that a policy lets its pods connect to."""
-    found = set()
-    for rule in policies[name]["egress"]:
-        for port in rule.get("ports", ({"port": "any"},)):
-            for peer in rule.get("to", ({},)):
-                labels = peer.get("podSelector", {}).get("matchLabels") or peer.get("namespaceSelector", {}).get(
-                    "matchLabels", {"": "anywhere"}
-                )
-                found.add((next(iter(labels.values())), port["port"]))
-    return found
-
-
-def test_pods_reach_only_what_they_need(rendered: RenderedOverlay) -> None:
-    policies = {name: one["spec"] for name, one in rendered.of("NetworkPolicy").items()}
-    dns: tuple[str, int | str] = ("kube-system", 53)
-    assert egress_peers(policies, "gateway") == {("service", "http"), dns}
-    assert egress_peers(policies, "service") == {("nats", "bus"), ("postgres", "sql"), dns}
-    assert egress_peers(policies, "postgres") == set()
-    assert egress_peers(policies, "nats") == {("nats", "any"), dns}
-    # the library of a cluster is elsewhere
-    others = policies.keys() - {"nobody", "gateway", "service", "postgres", "nats"}
-    assert {peer for name in others for peer in egress_peers(policies, name)} <= {("anywhere", 443)}
-
-
-def test_secrets_of_tokens_are_files(rendered: RenderedOverlay) -> None:
-    for name in SERVICES:
-        assert not {"BUNRAKU_SECRET", "BUNRAKU_SECRET_BEFORE"} & rendered.environment(name).keys()
-        folder = rendered.environment(name)["BUNRAKU_SECRETS"]
-        (mount,) = (one for one in rendered.container(name)["volumeMounts"] if one["mountPath"] == folder)
-        (volume,) = (one for one in rendered.pods()[name]["volumes"] if one["name"] == mount["name"])
-        paths = {item["path"] for one in volume["projected"]["sources"] for item in one["secret"]["items"]}
-        assert paths == {"BUNRAKU_SECRET", "BUNRAKU_SECRET_BEFORE"}
-
-
-def test_certificates_of_the_readme_are_accepted_by_clients(rendered: RenderedOverlay, tmp_path: Path) -> None:
-    authority = tmp_path / "ca.crt"
-    authority.write_text(rendered.one("ConfigMap", "authority")["data"]["ca.crt"])
-    client = create_client_context(str(authority))
-    # Python 3.13 verifies by this flag
-    client.verify_flags |= ssl.VerifyFlags.VERIFY_X509_STRICT
-    for service, hosts in (("nats", ["nats", "nats-0.nats", "nats-2.nats"]), ("postgres", ["postgres"])):
-        data = rendered.one("Secret", f"{service}-tls")["data"]
-        for name in ("tls.crt", "tls.key"):
-            (tmp_path / name).write_bytes(base64.b64decode(data[name]))
-        server = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
-        server.load_cert_chain(tmp_path / "tls.crt", tmp_path / "tls.key")
-        for host in hosts:
-            exchange_handshake(client, server, host)
-        with pytest.raises(ssl.SSLCertVerificationError):
-            exchange_handshake(client, server, "gateway")
-    # the key of the authority is not kept
-    assert all("ca.key" not in one.get("data", {}) for one in rendered.manifests)
-
-
-def test_pods_are_replaced_one_at_a_time(rendered: RenderedOverlay) -> None:
-    budgets = rendered.of("PodDisruptionBudget")
-    for name in (*SERVICES, "gateway", "nats"):
-        assert budgets[name]["spec"]["maxUnavailable"] == 1
-    for name in SERVICES:
-        spec = rendered.of("Deployment")[name]["spec"]
-        assert spec["strategy"]["rollingUpdate"] == {"maxSurge": 1, "maxUnavailable": 0}
-        assert spec["minReadySeconds"] > 30
-
-
-def test_streams_scale_with_the_number_of_viewers(cluster: RenderedOverlay) -> None:
-    scalers = cluster.of("HorizontalPodAutoscaler")
-    assert set(scalers) == {"stream", "session", "gateway"}
-    for name, scaler in scalers.items():
-        assert scaler["spec"]["scaleTargetRef"] == {"apiVersion": "apps/v1", "kind": "Deployment", "name": name}
-        # otherwise each `kubectl apply` would overwrite the value of the autoscaler
-        assert "replicas" not in cluster.of("Deployment")[name]["spec"]
-        down = scaler["spec"]["behavior"]["scaleDown"]
-        assert down["stabilizationWindowSeconds"] >= 600
-        assert [policy["type"] for policy in down["policies"]] == ["Pods"]
-    metrics = scalers["stream"]["spec"]["metrics"]
-    (viewers,) = (one["pods"] for one in metrics if one["type"] == "Pods")
-    assert viewers["target"]["type"] == "AverageValue"
-    # the documents state the same number
-    per_replica = f"{int(viewers['target']['averageValue']):,}"
-    assert f"{per_replica} each" in (KUBERNETES / "README.md").read_text()
-    assert f"{per_replica} viewers a replica" in (REPOSITORY / "deploy" / "SCALE.md").read_text()
-    adapter = yaml.safe_load((KUBERNETES / "prometheus" / "adapter-values.yaml").read_text())
-    (rule,) = adapter["rules"]["custom"]
-    assert (
-        re.sub(rule["name"]["matches"], rule["name"]["as"], rule["seriesQuery"].partition("{")[0])
-        == (viewers["metric"]["name"])
-    )
-    assert rule["resources"]["overrides"] == {one: {"resource": one} for one in ("namespace", "pod")}
-    assert rule["metricsQuery"] == "sum(<<.Series>>{<<.LabelMatchers>>}) by (<<.GroupBy>>)"
-
-
-def test_autoscaler_uses_an_exported_metric(cluster: RenderedOverlay) -> None:
-    metrics_source = REPOSITORY / "services" / "bunraku" / "stream" / "metrics.py"
-    if not metrics_source.exists():
-        pytest.skip("the stream service exports no metrics")
-    names = {f"bunraku_{name}" for name in re.findall(r'\.gauge\(\s*"(\w+)"', metrics_source.read_text())}
-    metrics = cluster.of("HorizontalPodAutoscaler")["stream"]["spec"]["metrics"]
-    assert {one["pods"]["metric"]["name"] for one in metrics if one["type"] == "Pods"} <= names
-
-
-def test_prometheus_discovers_services_by_monitor_and_annotation(rendered: RenderedOverlay) -> None:
-    monitor = yaml.safe_load((KUBERNETES / "prometheus" / "pod-monitor.yaml").read_text())
-    (endpoint,) = monitor["spec"]["podMetricsEndpoints"]
-    settings = rendered.one("ConfigMap", "settings")["data"]
-    for name in SERVICES:
-        template = rendered.of("Deployment")[name]["spec"]["template"]
-        assert monitor["spec"]["selector"]["matchLabels"].items() <= template["metadata"]["labels"].items()
-        ports = {port["name"]: port["containerPort"] for port in rendered.container(name)["ports"]}
-        assert settings["BUNRAKU_METRICS"] == f"0.0.0.0:{ports[endpoint['port']]}"
-        assert template["metadata"]["annotations"]["prometheus.io/port"] == str(ports[endpoint["port"]])
-
-
-def test_cluster_overlay_shares_no_volume(cluster: RenderedOverlay) -> None:
-    assert not cluster.of("PersistentVolumeClaim")
-    for name in SERVICES:
-        assert all("persistentVolumeClaim" not in one for one in cluster.pods()[name]["volumes"])
-        assert cluster.environment(name)["BUNRAKU_LIBRARY"].startswith("s3://")
-
-
-def test_all_nats_servers_are_listed_in_every_setting(cluster: RenderedOverlay) -> None:
-    count = cluster.of("StatefulSet")["nats"]["spec"]["replicas"]
-    names = [f"nats-{number}.nats" for number in range(count)]
-    assert re.findall(r"@([^:]+):4222", cluster.environment("stream")["BUNRAKU_BUS"]) == names
-    assert re.findall(r"@([^:]+):6222", " ".join(cluster.container("nats")["args"])) == names
-    assert cluster.environment("session")["BUNRAKU_REGISTER_REPLICAS"] == str(count)
-    mounted = cluster.container("nats")["volumeMounts"]
-    assert "/etc/bunraku" in {one["mountPath"] for one in mounted}
-    own = cluster.one("ConfigMap", "bus")["data"]["nats.conf"]
-    assert own == (KUBERNETES / "overlays" / "cluster" / "nats.conf").read_text()
-    # each of the three has the settings of a single server
-    single = (REPOSITORY / "deploy" / "nats.conf").read_text()
-    assert {*filter(None, single.splitlines()[1:])} <= {*own.splitlines()}
 
 
 def test_image_tags_equal_the_package_version(laptop: RenderedOverlay) -> None:

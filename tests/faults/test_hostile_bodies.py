@@ -32,7 +32,7 @@ ARM = "396-352-252-560-320-120"
 
 
 class ServedProcess:
-    """Server in a process of its own, with a log in JSON."""
+    """Server in a separate process, with a log in JSON."""
 
     def __init__(self, url: str, pid: int, log: Path) -> None:
         self.url, self.pid, self._log = url, pid, log

@@ -1,4 +1,4 @@
-"""What `kill -9` of a server in the middle of uploads leaves behind."""
+"""Files that remain after `kill -9` of a server during uploads."""
 
 from __future__ import annotations
 

@@ -250,7 +250,7 @@ async def test_address_that_fills_the_server_keeps_nobody_out(tmp_path: Path, mo
     with run_server(tmp_path) as url:
         port = urlsplit(url).port
         held = [await asyncio.open_connection("127.0.0.1", port, local_addr=("127.0.0.2", 0)) for _ in range(60)]
-        # the server closes what is beyond its capacity of 20
+        # the server closes connections beyond its capacity of 20
         ended = [asyncio.create_task(read_until_closed(reader)) for reader, _ in held]
         async with asyncio.timeout(HANG_TIMEOUT_S):
             while sum(task.done() for task in ended) < 40:  # noqa: ASYNC110

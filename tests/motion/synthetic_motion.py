@@ -1,4 +1,4 @@
-"""Sources of motion for tests: a smooth dance of a figure, told again as other programs would tell it."""
+"""Motions for tests: a smooth dance of a figure, in the conventions of several programs."""
 
 from __future__ import annotations
 

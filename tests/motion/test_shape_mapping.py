@@ -19,7 +19,7 @@ LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
 
 
 def scramble_names(source: bvh.Bvh) -> bvh.Bvh:
-    """`source` with names that say nothing."""
+    """Return `source` with names without a meaning."""
     numbers = np.random.default_rng(3).permutation(len(source.names))
     return replace(source, names=tuple(f"node{number}" for number in numbers))
 

@@ -26,7 +26,7 @@ SESSIONS, REPLICAS, HEARTBEATS = 1_000, 4, 4
 async def replicas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> AsyncIterator[list[tuple[SessionManager, Counter[str]]]]:
-    """Run session managers, each on a connection of its own; count the requests of each by operation."""
+    """Run session managers, each on a separate connection; count the requests of each by operation."""
     (tmp_path / "nats").mkdir()
     async with AsyncExitStack() as stack:
         server = stack.enter_context(run_jetstream(tmp_path / "nats"))

@@ -81,7 +81,7 @@ async def test_concurrent_requests_do_not_exceed_the_quota(managers: list[Sessio
     assert len(sessions) <= QUOTA
     listed, _ = await managers[0].list_sessions(50, None)
     assert sorted(session["id"] for session in listed) == sorted(sessions)
-    # what was refused takes no place
+    # a refused session does not count
     for _ in range(QUOTA - len(sessions)):
         await open_session(managers[1], "aiko")
 

@@ -29,7 +29,7 @@ TIMING = ReplicaTiming(heartbeat_s=0.05, timeout_s=0.4)
 
 
 class Replica:
-    """Session manager of a replica with a connection of its own to the key-value store."""
+    """Session manager of a replica with a separate connection to the key-value store."""
 
     def __init__(self, context: ServiceContext, store: RemoteKeyValueStore) -> None:
         self.store = store
@@ -216,7 +216,7 @@ async def test_session_that_ends_during_its_takeover_stays_away(
     with pytest.raises(ProblemError) as unavailable:
         await one.sessions.stage_proxy(session).end()
     assert unavailable.value.status == 503
-    # another replica ends it, as it would after a take-over of its own
+    # another replica ends it, as after a take-over
     entry = await server.get(session_key(session))
     assert entry is not None
     await server.remove(session_key(session), entry.revision)

@@ -3,16 +3,13 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
-from dataclasses import dataclass
 
 import msgpack
 import numpy as np
 import pytest
 
 from bunraku.codec import motion_decoder
-from bunraku.codec.container import StoredMotion, pack_motion
-from bunraku.codec.motion_encoder import encode_motion
+from bunraku.codec.container import StoredMotion
 from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.ownership import INPUT_TIMEOUT_US
 from bunraku.messaging.bus import MemoryBus
@@ -34,13 +31,11 @@ from bunraku.session.stage import (
     Stage,
     load_bend_tables,
 )
-from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
     Alive,
     Ask,
     Claim,
     Data,
-    Grant,
     Input,
     Notice,
     Presence,
@@ -51,46 +46,8 @@ from bunraku.wire.messages import (
 )
 from bunraku.wire.overlay import Overlay
 from tests.ingest.jobs.motions import MOTIONS
+from tests.session.joined_stage import StageMessages, join_stage, keep_holding, last_grant, stored_motion
 from tests.time_limit import HANG_TIMEOUT_S
-from tests.vectors.blocks import random_motion
-
-
-class StageMessages:
-    """Messages of a stage on the bus."""
-
-    def __init__(self, bus: MemoryBus) -> None:
-        self.messages: list[object] = []
-        self._more = asyncio.Event()
-        for subject in ("timeline", "presence", "overlay"):
-            bus.subscribe(f"session.s.{subject}", self._receive)
-
-    def _receive(self, message: bytes) -> None:
-        self.messages.append(unpack(message))
-        self._more.set()
-
-    async def wait_for(self, number: int, kind: type) -> list[object]:
-        async with asyncio.timeout(HANG_TIMEOUT_S):
-            while len(found := [m for m in self.messages if isinstance(m, kind)]) < number:
-                self._more.clear()
-                await self._more.wait()
-        return found
-
-    async def wait_until_at_rest(self) -> None:
-        """Wait for an overlay without limbs."""
-        count = 1
-        while (found := await self.wait_for(count, Overlay)) and found[-1].limbs:  # type: ignore[attr-defined]
-            count = len(found) + 1
-
-
-async def stored_motion(name: str, seed: int) -> StoredMotion:
-    store = MotionStore.open("memory:///")
-    await store.put(
-        name,
-        pack_motion(name, encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live")),
-    )
-    motion = await store.get(name)
-    assert motion is not None
-    return motion
 
 
 @pytest.fixture
@@ -106,43 +63,6 @@ async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
     opened = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
     yield opened
     await opened.close()
-
-
-@dataclass
-class JoinedPuppeteer:
-    """Puppeteer who has joined a stage, and the messages it has received."""
-
-    puppeteer: Puppeteer
-    received: list[bytes]
-
-    @property
-    def id(self) -> str:
-        return self.puppeteer.id
-
-
-def join_stage(stage: Stage, name: str) -> JoinedPuppeteer:
-    received: list[bytes] = []
-    return JoinedPuppeteer(stage.join(name.lower(), name, received.append), received)
-
-
-def last_grant(joined: JoinedPuppeteer) -> Grant:
-    return next(m for m in map(unpack, reversed(joined.received)) if isinstance(m, Grant))
-
-
-@asynccontextmanager
-async def keep_holding(stage: Stage, joined: JoinedPuppeteer, limb: int) -> AsyncIterator[None]:
-    """Send heartbeats for a limb until the context ends."""
-
-    async def send_heartbeats() -> None:
-        while True:
-            stage.receive(joined.puppeteer, Alive([limb]))
-            await asyncio.sleep(0.05)
-
-    heartbeats = asyncio.create_task(send_heartbeats())
-    try:
-        yield
-    finally:
-        heartbeats.cancel()
 
 
 async def test_overlays_have_only_controlled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:

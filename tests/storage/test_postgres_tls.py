@@ -45,7 +45,7 @@ async def open_error(url: str) -> str:
 
 
 async def store_and_read(url: str) -> None:
-    """Migrate the catalogue and use it; the migration has a connection of its own."""
+    """Migrate the catalogue and use it; the migration uses a separate connection."""
     catalogue = await SqlCatalogue.open(url)
     try:
         assert await catalogue.add_motion(CatalogueEntry("m1", 1, {}, "a", 1))
