@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -19,8 +18,6 @@ from tests.servers import run_server
 
 EXAMPLES = 12
 """Examples per operation and mode."""
-TOTAL_TIMEOUT_S = 25.0
-"""Time after which no further request is sent, seconds."""
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +28,7 @@ def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 def test_no_request_causes_a_server_error(guarded: str, tally: Callable[[str], None]) -> None:
     schema = schemathesis.openapi.from_url(f"{guarded}/v1/openapi.json")
-    headers, started, requests = bearer_headers(make_token(lifetime_s=3_600)), time.monotonic(), 0
+    headers, requests = bearer_headers(make_token(lifetime_s=3_600)), 0
     operations: list[Any] = [operation.ok() for operation in schema.get_all_operations()]  # type: ignore[union-attr]
     for operation in operations:
         for mode in GenerationMode:
@@ -42,9 +39,8 @@ def test_no_request_causes_a_server_error(guarded: str, tally: Callable[[str], N
             )
             def send(case: Any) -> None:
                 nonlocal requests
-                if time.monotonic() - started < TOTAL_TIMEOUT_S:
-                    requests += 1
-                    case.call_and_validate(headers=headers, checks=[not_a_server_error])
+                requests += 1
+                case.call_and_validate(headers=headers, checks=[not_a_server_error])
 
             # some operations accept every input: no invalid request exists
             with contextlib.suppress(Unsatisfiable):

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bunraku.runtime.compile_cache import compile_cache_folder
 from bunraku.wire.messages import Description
 from tests.fuzz.targets import TARGETS, TRACK_DESCRIPTIONS, load_seeds
 
@@ -87,9 +88,19 @@ def test_random_input_is_accepted_or_rejected_as_declared(
     tally(f"Hypothesis, {request.node.callspec.id}: {sum(counts)} inputs, {counts[1]} accepted, {counts[0]} rejected")
 
 
+@pytest.fixture
+def checked_kernels(pytestconfig: pytest.Config, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Folder for kernels compiled with bounds checks, reused by later runs with the same sources."""
+    assert pytestconfig.cache is not None
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(pytestconfig.cache.mkdir("boundscheck")))
+    folder = compile_cache_folder("codec")
+    assert folder is not None
+    return folder
+
+
 @pytest.mark.timeout(600)
 def test_coverage_guided_input_is_accepted_or_rejected_as_declared(
-    tmp_path: Path, tally: Callable[[str], None]
+    tmp_path: Path, tally: Callable[[str], None], checked_kernels: str
 ) -> None:
     if find_spec("atheris") is None:
         reason = "atheris is not installed: it has wheels for CPython 3.11 to 3.14 on Linux, x86-64"
@@ -101,7 +112,7 @@ def test_coverage_guided_input_is_accepted_or_rejected_as_declared(
     result = subprocess.run(
         [sys.executable, "-m", "tests.fuzz", corpus, file, *options],
         cwd=REPOSITORY,
-        env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path / "numba")},
+        env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": checked_kernels},
         capture_output=True,
         text=True,
         timeout=580,
