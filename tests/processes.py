@@ -19,7 +19,8 @@ from pathlib import Path
 
 import pytest
 
-START_TIMEOUT_S = 120.0
+from tests.time_limit import HANG_TIMEOUT_S
+
 PORTS_PER_WORKER = 1_000
 """Number of ports of an xdist worker."""
 
@@ -74,7 +75,7 @@ class ServerProcess:
             self._process = subprocess.Popen(
                 self.command, stdout=output, stderr=output, stdin=subprocess.DEVNULL, cwd=self.folder, user=self._user
             )
-        deadline = time.monotonic() + START_TIMEOUT_S
+        deadline = time.monotonic() + HANG_TIMEOUT_S
         while time.monotonic() < deadline and self._process.poll() is None:
             try:
                 socket.create_connection(("127.0.0.1", self.port), 1).close()
@@ -102,7 +103,7 @@ class ServerProcess:
         pids = self._process_tree()
         for pid in pids:
             _send_signal(pid, signal.SIGSTOP)
-        deadline = time.monotonic() + START_TIMEOUT_S
+        deadline = time.monotonic() + HANG_TIMEOUT_S
         while any(_process_state(pid) not in "TXZ" for pid in pids):
             assert time.monotonic() < deadline, "the process did not pause"
             time.sleep(0.005)

@@ -13,6 +13,7 @@ from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.skeleton import Motion
 from bunraku.runtime.settings import Settings
 from bunraku.serve import SERVICES, serve
+from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
 
 
@@ -55,12 +56,12 @@ def run_server(
     thread = threading.Thread(target=run, name=f"server {url}")
     thread.start()
     try:
-        assert started.wait(60), "the server did not start"
+        assert started.wait(HANG_TIMEOUT_S), "the server did not start"
         assert not failures, failures
         yield url
     finally:
         ended.set()
-        thread.join(20)
+        thread.join(HANG_TIMEOUT_S)
         assert not thread.is_alive(), "the server did not stop"
         assert not failures, failures
 

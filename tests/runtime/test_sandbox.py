@@ -88,7 +88,7 @@ def outcomes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Outcome]:
         # a new worker server, with these variables around it
         forkserver._forkserver._stop()  # type: ignore[attr-defined]
         with run_in_worker(attempt_all, source, os.getpid(), secret_file) as receiver:
-            assert receiver.poll(60)
+            assert receiver.poll(HANG_TIMEOUT_S)
             received: dict[str, Outcome] = receiver.recv()
         pid = forkserver._forkserver._forkserver_pid  # type: ignore[attr-defined]
         environment = Path(f"/proc/{pid}/environ").read_bytes()
@@ -157,7 +157,7 @@ def test_worker_cannot_exceed_its_limits(outcomes: dict[str, Outcome]) -> None:
 def test_worker_ends_at_its_cpu_limit() -> None:
     # together with the margin, one second of CPU time
     with run_in_worker(use_processor, (1.0 - sandbox.CPU_MARGIN_S) / (os.cpu_count() or 1)) as receiver:
-        assert receiver.poll(60)
+        assert receiver.poll(HANG_TIMEOUT_S)
         pid = receiver.recv()
         deadline = time.monotonic() + HANG_TIMEOUT_S
         while is_running(pid):
