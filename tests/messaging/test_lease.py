@@ -93,6 +93,6 @@ async def test_abandonment_is_noticed_while_the_holder_stays_registered() -> Non
     # a replica that is killed stays registered, without heartbeats
     killed = ReplicaRegistry(store, TIMING)
     await store.put("work", (await killed.register()).encode())
-    async with asyncio.timeout(20):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         await waiting
     assert list(store.watch().entries) == [killed.key, "work"]

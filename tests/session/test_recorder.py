@@ -15,6 +15,7 @@ from bunraku.runtime.settings import Settings
 from bunraku.session import recorder
 from bunraku.session.recording import PackedRecording
 from bunraku.session.stage_proxy import StageProxy
+from tests.time_limit import HANG_TIMEOUT_S
 
 RECORDING = PackedRecording(None, None, b"")
 
@@ -57,7 +58,7 @@ async def test_death_of_the_recording_replica_ends_the_request(context: ServiceC
         raise AssertionError
 
     context.bus.serve(RECORDING_SUBJECT, die)
-    async with asyncio.timeout(60):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with pytest.raises(ProblemError) as raised:
             await recorder.record_session(stage, RECORDING, context)
     assert raised.value.status == 503
