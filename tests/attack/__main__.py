@@ -18,13 +18,22 @@ from tests.attack.lab import VIEWERS, open_lab
 from tests.attack.registry import load_attacks
 from tests.attack.result import MAX_GAP_RATIO, AttackResult
 
+SECONDS = 4.0
+"""Duration of an attack in a full run."""
+SHORT_SECONDS = 2.0
+"""Duration of an attack in a short run: the connections of a flooder must be closed within as much."""
+
 
 def main() -> None:
     """Parse the command line, run the attacks and print a row for each."""
     parser = argparse.ArgumentParser(prog="make verify-attack", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", default="", help="words, separated by commas: run attacks whose name contains one")
     parser.add_argument("--rows", default="", help="rows of the table, separated by commas")
-    parser.add_argument("--seconds", type=float, default=4.0, help="duration of an attack; some take longer")
+    parser.add_argument(
+        "--seconds",
+        type=float,
+        help=f"duration of an attack ({SECONDS:g}, with --short {SHORT_SECONDS:g}); some take longer",
+    )
     parser.add_argument("--short", action="store_true", help="give no attack more than --seconds")
     parser.add_argument("--viewers", type=int, default=VIEWERS, help="number of calm viewers")
     parser.add_argument("--attempts", type=int, default=2, help="attempts if only the overlay gap is too long")
@@ -53,7 +62,8 @@ def main() -> None:
         with open_lab(options.compose, options.viewers) as lab:
             print(f"calm: overlay gap p99 {lab.calm_ms:.0f} ms with {options.viewers} viewers", flush=True)
             for attack in attacks:
-                seconds = options.seconds if options.short else max(options.seconds, attack.seconds)
+                seconds = options.seconds or (SHORT_SECONDS if options.short else SECONDS)
+                seconds = seconds if options.short else max(seconds, attack.seconds)
                 results.append(lab.run(attack, seconds, MAX_GAP_RATIO, options.attempts))
                 print(results[-1].format_row(), flush=True)
     for inspection in inspections:

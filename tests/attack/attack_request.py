@@ -216,7 +216,7 @@ async def hostile_messagepack_keys(target: Target, report: Report) -> None:
         _require_safe(report, what, response)
 
 
-@attack(19, ANSWERED, quick=True)
+@attack(19, ANSWERED)
 async def hostile_headers(target: Target, report: Report) -> None:
     """Send headers that a server parses itself, with hostile values, to each kind of resource."""
     script = (await find_page_files(target))[0]
