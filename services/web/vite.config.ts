@@ -20,7 +20,7 @@ const preloadStage: Plugin = {
 };
 
 /** Time limit of a test, a hook and a polled expectation, in milliseconds. It only ends tests that hang. */
-const TEST_TIMEOUT_MS = 90_000;
+const TEST_TIMEOUT_MS = 120_000;
 
 export default defineConfig({
   plugins: [preloadStage],

@@ -6,7 +6,7 @@ import { chromiumPath, connectToChromium } from "./chromium";
 import type { ServerKind, SharedServer } from "./shared-resources";
 
 /** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
-export const PAGE_TIMEOUT_MS = 90_000;
+export const PAGE_TIMEOUT_MS = 120_000;
 
 export interface OpenOptions extends BrowserContextOptions {
   /** Called with the page before it navigates. */
@@ -46,7 +46,7 @@ if (!isInstalled && process.env["CI"])
 /** Define a suite of browser tests. Where Chromium is not installed, it is skipped with a warning. */
 export function describeInBrowser(
   name: string,
-  { server: kind, browser: flags = [], timeout = 2 * PAGE_TIMEOUT_MS }: SuiteOptions,
+  { server: kind, browser: flags = [], timeout = 3 * PAGE_TIMEOUT_MS }: SuiteOptions,
   defineTests: (fixture: BrowserFixture) => void,
 ): void {
   if (!isInstalled) console.warn(`browser tests of ${name} skipped: Chromium is not installed`);

@@ -16,7 +16,7 @@ const WINDOWS = [
   [1024, 600],
 ] as const;
 
-describeInBrowser("screen layout", { server: "open", timeout: 300_000 }, ({ open }) => {
+describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
   test("tags of sixteen held limbs and toasts cover no face, bar or control", async () => {
     const page = await open("?name=Aiko", {
       viewport: { width: 390, height: 844 },
