@@ -51,6 +51,9 @@ class NodeObjects:
         await self._access()
         self._disk.objects[path] = data
 
+    async def put_file(self, path: str, source: Path) -> None:
+        await self.put(path, await asyncio.to_thread(source.read_bytes))
+
     async def get(self, path: str) -> bytes | None:
         await self._access()
         return self._disk.objects.get(path)
