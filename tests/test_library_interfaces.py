@@ -30,6 +30,7 @@ from uvicorn.server import ServerState
 from websockets.streams import StreamReader
 
 from bunraku.serve import uvicorn_protocol_options
+from tests.time_limit import HANG_TIMEOUT_S
 
 PYPROJECT = Path(__file__).parents[1] / "pyproject.toml"
 BOUNDED_LIBRARIES = ("fastapi", "h11", "httpx2", "numba", "uvicorn", "websockets")
@@ -132,6 +133,6 @@ def test_numba_has_external_functions_and_a_cache_folder() -> None:
 
 def test_httpx2_clients_share_the_default_timeout() -> None:
     # tests/conftest.py raises the read timeout for slow machines
-    assert DEFAULT_TIMEOUT_CONFIG.read == 60.0
+    assert DEFAULT_TIMEOUT_CONFIG.read == HANG_TIMEOUT_S
     with httpx2.Client() as client:
-        assert client.timeout.read == 60.0
+        assert client.timeout.read == HANG_TIMEOUT_S

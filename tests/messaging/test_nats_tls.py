@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+import socket
 import ssl
+import struct
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
@@ -154,6 +156,24 @@ async def test_server_may_require_a_client_certificate(tmp_path: Path, authority
         await (await NatsConnection.open(address, NoMessages(), [])).close()
         assert "certificate of this client" in await open_error(url)
         assert "certificate of this client" in await open_error(f"{url}&cert={stranger.certificate}&key={stranger.key}")
+
+
+async def test_reset_instead_of_an_alert_hints_at_the_client_certificate(authority: Authority) -> None:
+    files = authority.issue("nats", "localhost")
+    context = ssl.create_default_context(ssl.Purpose.CLIENT_AUTH)
+    context.load_cert_chain(files.certificate, files.key)
+
+    async def reset(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        writer.write(b'INFO {"max_payload": 1000}\r\n')
+        await reader.readuntil(b"PING\r\n")
+        connected = writer.get_extra_info("socket")
+        connected.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        writer.transport.abort()
+
+    async with await asyncio.start_server(reset, "127.0.0.1", ssl=context) as listening:
+        port = listening.sockets[0].getsockname()[1]
+        error = await open_error(f"tls://localhost:{port}?ca={authority.ca}&handshake=first")
+    assert "certificate of this client" in error
 
 
 async def test_unusable_file_is_named(tmp_path: Path, server: ServerProcess, authority: Authority) -> None:

@@ -141,6 +141,11 @@ class NatsConnection(asyncio.Protocol):
             raise ConnectionError(f"{self._host} closed the connection during the TLS handshake")
         self._transport = transport
 
+    @property
+    def _has_only_tls(self) -> bool:
+        """True after the TLS handshake, while the server has not accepted the client."""
+        return self._transport is not self._tcp_transport and not self._pong_received.done()
+
     async def _wait_or_raise(self, awaited: asyncio.Future[None]) -> None:
         await asyncio.wait((awaited, self.closed), return_when=asyncio.FIRST_COMPLETED)
         if self.closed.done():
@@ -212,6 +217,9 @@ class NatsConnection(asyncio.Protocol):
             if isinstance(error, ssl.SSLError):
                 # with TLS 1.3 a server rejects the certificate of a client only after the handshake
                 error = ConnectionError(describe_tls_error(error, self._host))
+            elif isinstance(error, ConnectionError) and self._has_only_tls:
+                # a reset may overtake the alert with which the server explains it
+                error = ConnectionError(f"{self._host} may ask for a certificate of this client, or not trust it")
             self.closed.set_result(f"{self._close_reason}: {error}" if error else self._close_reason)
 
     def data_received(self, data: bytes) -> None:
