@@ -116,9 +116,13 @@ class Workload:
             try:
                 await operation()
                 self.counts[name] += 1
-            except TRANSIENT:
-                self.counts[f"failed {name}"] += 1
+            except TRANSIENT as error:
+                self._count_failure(name, error)
             await asyncio.sleep(interval_s)
+
+    def _count_failure(self, name: str, error: Exception) -> None:
+        reason = error.status if isinstance(error, ServerProblem) else type(error).__name__
+        self.counts[f"failed {name}: {reason}"] += 1
 
     async def _open_and_end_sessions(self) -> None:
         opened: list[str] = []
@@ -128,8 +132,8 @@ class Workload:
                 self.counts["session"] += 1
                 if len(opened) > OPEN_SESSIONS:
                     await next(self._turns["session"])._request("DELETE", f"/v1/sessions/{opened.pop(0)}")
-            except TRANSIENT:
-                self.counts["failed session"] += 1
+            except TRANSIENT as error:
+                self._count_failure("session", error)
             await asyncio.sleep(SESSION_INTERVAL_S)
 
     async def _control(self) -> None:
