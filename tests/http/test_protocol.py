@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import socket
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -163,6 +164,30 @@ async def test_response_to_a_client_that_does_not_read_is_bounded(url: str, monk
                 await writer.drain()
                 await asyncio.sleep(0.01)
     writer.close()
+
+
+async def test_small_responses_to_a_client_that_does_not_read_are_bounded(
+    url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(transport, "WRITE_WINDOW_S", 0.2)
+    parts = urlsplit(url)
+    with socket.socket() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4_096)
+        client.connect((parts.hostname, parts.port))
+        client.setblocking(False)
+        # their responses are far less than the kernel would accept for one connection
+        requests = b"GET /v1/health HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n" * 5_000
+        sending = asyncio.create_task(asyncio.get_running_loop().sock_sendall(client, requests))
+
+        def is_reset() -> bool:
+            failed = sending.done() and sending.exception() is not None
+            return failed or client.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) != 0
+
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while not is_reset():  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        sending.cancel()
+        await asyncio.gather(sending, return_exceptions=True)
 
 
 class RecordingTransport(asyncio.Transport):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import sys
 from collections.abc import Callable
@@ -73,6 +74,17 @@ def unsent_bytes(transport: asyncio.Transport) -> int:
         return buffered + int.from_bytes(fcntl.ioctl(connected.fileno(), _SIOCOUTQ, _ZERO_INT), sys.byteorder)
     except OSError:
         return buffered
+
+
+def set_send_buffer(transport: asyncio.BaseTransport, size: int) -> None:
+    """Limit the kernel's send buffer of a connection.
+
+    Linux doubles `size` and counts the overhead of its buffers, so that about as much payload fits in typical messages.
+    """
+    connected: socket.socket | None = transport.get_extra_info("socket")
+    if connected is not None:
+        with contextlib.suppress(OSError):
+            connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, size)
 
 
 class LingeringClose(asyncio.Protocol):

@@ -18,7 +18,7 @@ from bunraku.runtime.client_network import peer_network
 from bunraku.runtime.clock import clock
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.token_bucket import TokenBucket
-from bunraku.runtime.transport import LingeringClose, WriteDeadline
+from bunraku.runtime.transport import LingeringClose, WriteDeadline, set_send_buffer
 from bunraku.websocket.frame import (
     MESSAGE_TOO_BIG,
     ClientFrameParser,
@@ -34,8 +34,7 @@ from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, Problem
 CLOSE_TIMEOUT_S = 10.0
 """Time for the client to answer a Close frame."""
 SEND_BUFFER_BYTES = 32 << 10
-"""Kernel send buffer of a viewer, in payload of typical messages. Linux doubles the value that it is given and counts
-the overhead of its buffers. Data in this buffer cannot be replaced when newer data is to be sent."""
+"""Kernel send buffer of a viewer. Data in this buffer cannot be replaced when newer data is to be sent."""
 
 
 FRAMES_PER_TURN = 16
@@ -141,8 +140,8 @@ class WebSocketConnection(asyncio.Protocol):
         if raw_socket is not None:
             if transport.get_extra_info("sslcontext") is None:
                 self.file_descriptor = raw_socket.fileno()
+            set_send_buffer(transport, SEND_BUFFER_BYTES)
             with contextlib.suppress(OSError):
-                raw_socket.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, SEND_BUFFER_BYTES)
                 # not every event loop sets this
                 raw_socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         transport.set_protocol(self)
