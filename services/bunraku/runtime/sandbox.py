@@ -62,6 +62,7 @@ def start_worker_server() -> None:
     """
     with _start_lock:
         _prepare_server()
+        _deny_new_privileges()
         with _restricted_environment():
             forkserver.ensure_running()
 
@@ -83,9 +84,15 @@ def enter_sandbox(result_descriptor: int, readable: Collection[Path], max_memory
         os._exit(1)
     # effective, permitted and inheritable capabilities: none
     libc.capset(struct.pack("=Ii", _CAPABILITY_VERSION, 0), bytes(24))
-    libc.prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+    _deny_new_privileges()
     landlock.restrict_files([*_program_files(), *readable], [Path("/dev/null")])
     seccomp.deny_system_calls()
+
+
+def _deny_new_privileges() -> None:
+    """Let programs that this thread or its children start gain no privileges (prctl(2), PR_SET_NO_NEW_PRIVS)."""
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
 
 
 def _prepare_server() -> None:
