@@ -192,7 +192,8 @@ class NatsConnection(asyncio.Protocol):
     def abort(self, reason: str) -> None:
         """Close the connection at once and discard unsent data."""
         self._close_reason = reason
-        self._transport.abort()
+        # not the transport of TLS: in Python 3.11.2 that one cannot be aborted after it was closed
+        self._tcp_transport.abort()
         self.connection_lost(None)
 
     def _send_heartbeat(self) -> None:
