@@ -18,6 +18,7 @@ from bunraku.runtime import request_id
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
+from bunraku.runtime.temporary_folder import temporary_folder
 from bunraku.storage.record import CatalogueEntry, Job
 from bunraku.storage.table import JOBS
 from tests.time_limit import HANG_TIMEOUT_S
@@ -75,9 +76,16 @@ async def wait_for_job_count(expected: int, context: ServiceContext) -> None:
             await asyncio.sleep(0.02)
 
 
+async def read_source(context: ServiceContext) -> bytes | None:
+    """Return the stored file of job j1, None if there is none."""
+    with temporary_folder("job") as folder:
+        is_stored = await context.motion_store.copy_source("j1", folder / "source")
+        return (folder / "source").read_bytes() if is_stored else None
+
+
 async def is_empty(context: ServiceContext) -> bool:
     """Return whether there is neither a job nor its file."""
-    return await count_jobs(context) == 0 and await context.motion_store.get_source("j1") is None
+    return await count_jobs(context) == 0 and await read_source(context) is None
 
 
 async def wait_until_empty(context: ServiceContext) -> None:
@@ -94,7 +102,7 @@ JOB = UploadJob("j1", DETAILS)
 async def test_finished_job_is_removed(context: ServiceContext, source: Path) -> None:
     replica = QueueReplica(context)
     async with replica.queue.persist_job(JOB, source):
-        assert await context.motion_store.get_source("j1") == b"uploaded bytes"
+        assert await read_source(context) == b"uploaded bytes"
     assert await is_empty(context)
     with pytest.raises(ProblemError):
         async with replica.queue.persist_job(JOB, source):

@@ -58,6 +58,12 @@ class NodeObjects:
         await self._access()
         return self._disk.objects.get(path)
 
+    async def copy(self, path: str, target: Path) -> bool:
+        contents = await self.get(path)
+        if contents is not None:
+            await asyncio.to_thread(target.write_bytes, contents)
+        return contents is not None
+
     async def delete(self, path: str) -> None:
         await self._access()
         self._disk.objects.pop(path, None)

@@ -59,11 +59,14 @@ async def test_object_exists_until_it_is_deleted(url: str, size: int) -> None:
     assert await reopened.get("some/object") is None
 
 
-async def test_file_is_stored_as_an_object(url: str, tmp_path: Path) -> None:
-    data, source = secrets.token_bytes(12_000_000), tmp_path / "source"
+async def test_file_is_stored_as_an_object_and_copied_back(url: str, tmp_path: Path) -> None:
+    data, source, target = secrets.token_bytes(12_000_000), tmp_path / "source", tmp_path / "target"
     source.write_bytes(data)
     await ObjectStorage(url).put_file("some/object", source)
     assert await ObjectStorage(url).get("some/object") == data
+    assert await ObjectStorage(url).copy("some/object", target)
+    assert target.read_bytes() == data
+    assert not await ObjectStorage(url).copy("no/object", target)
 
 
 async def test_motion_store_stores_motions_and_logs(url: str) -> None:
@@ -83,21 +86,23 @@ async def test_motion_store_stores_motions_and_logs(url: str) -> None:
     assert await MotionStore.open(url).get("m1") is None
 
 
-async def assert_unavailable(objects: ObjectStorage) -> None:
+async def assert_unavailable(objects: ObjectStorage, tmp_path: Path) -> None:
     with pytest.raises(BackendUnavailable, match="the library"):
         await objects.put("object", b"data")
     with pytest.raises(BackendUnavailable):
         await objects.get("object")
     with pytest.raises(BackendUnavailable):
+        await objects.copy("object", tmp_path / "target")
+    with pytest.raises(BackendUnavailable):
         await objects.delete("object")
 
 
-async def test_suspended_server_is_unavailable_until_resumed(server: ServerProcess, s3: str) -> None:
+async def test_suspended_server_is_unavailable_until_resumed(server: ServerProcess, s3: str, tmp_path: Path) -> None:
     objects = ObjectStorage(s3)
     await objects.put("kept", b"data")
     server.pause()
     try:
-        await assert_unavailable(objects)
+        await assert_unavailable(objects, tmp_path)
     finally:
         server.resume()
     assert await objects.get("kept") == b"data"
@@ -114,7 +119,7 @@ async def test_killed_server_is_unavailable_but_cached_motions_are_served(tmp_pa
         await store.put("m1", pack_motion("m1", encoded))
         assert await store.get("m1") is not None
         other_server.kill()
-        await assert_unavailable(objects)
+        await assert_unavailable(objects, tmp_path)
         assert await store.get("m1") is not None
         other_server.start()
         httpx2.put(f"{endpoint}/bucket").raise_for_status()

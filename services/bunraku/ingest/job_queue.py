@@ -199,14 +199,13 @@ class JobQueue:
         self.resumed_jobs += 1
         try:
             handler = self._handlers.get(job.details.get("kind", ""))
-            source = await self._context.motion_store.get_source(job.id)
-            if handler is None or source is None or job.tries > MAX_ATTEMPTS:
-                _log.error("Job %s given up after %d attempts: %s", job.id, job.tries, job.details)
-            else:
-                _log.warning("Job %s was abandoned by its replica; running it here", job.id)
-                with temporary_folder("job") as folder:
-                    path = folder / "source"
-                    await asyncio.to_thread(path.write_bytes, source)
+            with temporary_folder("job") as folder:
+                path = folder / "source"
+                is_stored = await self._context.motion_store.copy_source(job.id, path)
+                if handler is None or not is_stored or job.tries > MAX_ATTEMPTS:
+                    _log.error("Job %s given up after %d attempts: %s", job.id, job.tries, job.details)
+                else:
+                    _log.warning("Job %s was abandoned by its replica; running it here", job.id)
                     await handler(job.details, path, UploadProgress())
         except ProblemError as error:
             if error.status >= 500:

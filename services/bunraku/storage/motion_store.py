@@ -89,9 +89,9 @@ class MotionStore:
         """Store an uploaded file; `name` is derived from its hash, one word."""
         await self._objects.put_file(f"sources/{name}", source)
 
-    async def get_source(self, name: str) -> bytes | None:
-        """Return an uploaded file, None if it does not exist."""
-        return await self._objects.get(f"sources/{name}")
+    async def copy_source(self, name: str, target: Path) -> bool:
+        """Write an uploaded file to the file `target`; return whether it is stored."""
+        return await self._objects.copy(f"sources/{name}", target)
 
     async def remove_source(self, name: str) -> None:
         """Remove an uploaded file if it exists."""

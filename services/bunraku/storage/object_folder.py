@@ -82,6 +82,16 @@ class ObjectFolder:
         except FileNotFoundError:
             return None
 
+    def copy(self, path: str, target: Path) -> bool:
+        """Write an object to the file `target`; return whether the object exists."""
+        try:
+            contents = self._resolve(path).open("rb")
+        except FileNotFoundError:
+            return False
+        with contents, target.open("wb") as file:
+            shutil.copyfileobj(contents, file, COPY_CHUNK_BYTES)
+        return True
+
     def remove(self, path: str) -> None:
         """Remove an object if it exists. After a power loss it may exist again, as an object without a row."""
         self._resolve(path).unlink(missing_ok=True)

@@ -15,7 +15,7 @@ from obstore.store import ObjectStore, from_url
 
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 from bunraku.runtime.insufficient_storage import insufficient_storage, is_disk_full
-from bunraku.storage.object_folder import LIST_CHUNK, ObjectFolder, StoredObject
+from bunraku.storage.object_folder import COPY_CHUNK_BYTES, LIST_CHUNK, ObjectFolder, StoredObject
 
 MIN_THROUGHPUT_BYTES_PER_S = 1 << 20
 """Throughput below which an object store counts as unavailable, in bytes per second."""
@@ -83,6 +83,17 @@ class ObjectStorage:
         except FileNotFoundError:
             return None
 
+    async def copy(self, path: str, target: Path) -> bool:
+        """Write an object to the file `target`, without having all of it in memory; return whether it exists."""
+        if self._folder is not None:
+            return await self._run_in_folder(lambda folder: folder.copy(path, target))
+        try:
+            response = await self._run_request(obstore.get_async(self._store, path))
+        except FileNotFoundError:
+            return False
+        await self._run_request(_write_chunks(response, target), response.meta["size"])
+        return True
+
     async def delete(self, path: str) -> None:
         """Remove an object if it exists."""
         if self._folder is not None:
@@ -149,6 +160,12 @@ class ObjectStorage:
             if _STORE_FULL.search(str(error)):
                 raise insufficient_storage("the library") from error
             raise BackendUnavailable("the library", _error_detail(error)) from error
+
+
+async def _write_chunks(response: obstore.GetResult, target: Path) -> None:
+    with await asyncio.to_thread(target.open, "wb") as file:
+        async for chunk in response.stream(min_chunk_size=COPY_CHUNK_BYTES):
+            await asyncio.to_thread(file.write, chunk)
 
 
 def _error_detail(error: Exception) -> str:
