@@ -65,9 +65,9 @@ async def open_session(watched: WatchedSessions, session: str = "s") -> None:
         pass
 
 
-async def join_viewer(watched: WatchedSessions) -> tuple[ViewerConnection, FakeTransport]:
+async def join_viewer(watched: WatchedSessions, session_id: str = "s") -> tuple[ViewerConnection, FakeTransport]:
     viewer, transport = ViewerConnection(watched._context), FakeTransport()
-    async with watched.open("s") as session:
+    async with watched.open(session_id) as session:
         session.add_viewer(viewer)
         viewer.open(transport.open_connection(viewer))
     return viewer, transport
@@ -204,6 +204,32 @@ async def test_state_is_requested_until_the_owner_answers(
     callbacks[0]()
     viewer.on_close()
     await asyncio.gather(*watched._resync_tasks)
+
+
+async def test_silent_owner_delays_no_other_session(motion_store: MotionStore) -> None:
+    bus = MemoryBus()
+    states, silent = {"s": STATE, "other": STATE}, False
+
+    def serve_state(session: str) -> None:
+        async def answer(_: bytes) -> bytes:
+            if silent and session == "s":
+                await asyncio.Event().wait()
+            packed: bytes = msgpack.packb([states[session].pack(), PRESENCE.pack(), None])
+            return packed
+
+        bus.serve(f"session.{session}.state", answer)
+
+    for session in states:
+        serve_state(session)
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+    joined = [await join_viewer(watched, session) for session in states]
+    await asyncio.gather(*watched._resync_tasks)
+    edited = states["other"] = timeline.edit(STATE, 2_000, playing=False)
+    silent = True
+    watched._resynchronise(*watched._sessions.values())
+    await asyncio.wait(watched._resync_tasks, return_when=asyncio.FIRST_COMPLETED)
+    assert edited in joined[1][1].messages
+    await watched.close()
 
 
 async def test_viewer_count_is_published_after_session_takeover(motion_store: MotionStore) -> None:

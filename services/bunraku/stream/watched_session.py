@@ -36,6 +36,8 @@ VIEWER_COUNT_REFRESH_S = 5.0
 for three intervals, as they have died."""
 RESYNCHRONISATION_RETRY_S = 1.0
 """Interval at which the state of a session is requested again until its owner answers, seconds."""
+CONCURRENT_RESYNCHRONISATIONS = 16
+"""Requests for the states of sessions that are sent at the same time, after a reconnection to the bus."""
 
 SESSION_ENDED = CloseConnection(NOT_FOUND, "Session ended", "a puppeteer has ended this session, or it was idle")
 
@@ -268,6 +270,7 @@ class WatchedSessions:
         self._context = context
         self._sessions: dict[str, WatchedSession] = {}
         self._resync_tasks: set[asyncio.Task[None]] = set()
+        self._resync_slots = asyncio.Semaphore(CONCURRENT_RESYNCHRONISATIONS)
         self._reconnects = bus.on_reconnect(lambda: self._resynchronise(*self._sessions.values()))
         self._records: Subscription | None = None
 
@@ -318,19 +321,20 @@ class WatchedSessions:
         return len(self._sessions)
 
     def _resynchronise(self, *sessions: WatchedSession) -> None:
-        async def resynchronise_all() -> None:
-            stale = list(sessions)
-            while stale := [session for session in stale if session in self._sessions.values()]:
-                for session in tuple(stale):
-                    with contextlib.suppress(BackendUnavailable):
-                        if await self._resynchronise_one(session):
-                            stale.remove(session)
-                # the owner may be unavailable now, and go on later without announcing itself
-                await asyncio.sleep(RESYNCHRONISATION_RETRY_S if stale else 0)
+        # a task for each, so that a silent owner delays no session of another
+        for session in sessions:
+            task = asyncio.create_task(self._resynchronise_until_current(session), name=f"resynchronise {session.id}")
+            self._resync_tasks.add(task)
+            task.add_done_callback(self._resync_tasks.discard)
 
-        task = asyncio.create_task(resynchronise_all(), name="resynchronise sessions")
-        self._resync_tasks.add(task)
-        task.add_done_callback(self._resync_tasks.discard)
+    async def _resynchronise_until_current(self, session: WatchedSession) -> None:
+        while self._sessions.get(session.id) is session:
+            with contextlib.suppress(BackendUnavailable):
+                async with self._resync_slots:
+                    if await self._resynchronise_one(session):
+                        return
+            # the owner may be unavailable now, and go on later without announcing itself
+            await asyncio.sleep(RESYNCHRONISATION_RETRY_S)
 
     async def _resynchronise_one(self, session: WatchedSession) -> bool:
         """Apply the session's state, or its end; return False if its owner does not answer now."""
