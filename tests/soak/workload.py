@@ -130,11 +130,20 @@ class Workload:
             try:
                 opened.append((await next(self._turns["session"]).open_session(self.motion))["id"])
                 self.counts["session"] += 1
-                if len(opened) > OPEN_SESSIONS:
-                    await next(self._turns["session"])._request("DELETE", f"/v1/sessions/{opened.pop(0)}")
+                while len(opened) > OPEN_SESSIONS:
+                    await self._end_session(opened[0])
+                    opened.pop(0)
             except TRANSIENT as error:
                 self._count_failure("session", error)
             await asyncio.sleep(SESSION_INTERVAL_S)
+
+    async def _end_session(self, session: str) -> None:
+        try:
+            await next(self._turns["session"])._request("DELETE", f"/v1/sessions/{session}")
+        except ServerProblem as problem:
+            # an earlier attempt has ended it, but its response was lost
+            if problem.status != 404:
+                raise
 
     async def _control(self) -> None:
         """Move the left hand; reconnect through the next replica whenever the connection is lost."""
