@@ -13,10 +13,11 @@ import pytest
 
 from bunraku.messaging.key_value import MemoryKeyValueStore
 from bunraku.messaging.replica_registry import ReplicaRegistry
+from bunraku.session.puppeteer_roster import Puppeteer
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRegistry, session_key
 from bunraku.session.stage import Stage
 from bunraku.stream.watched_session import WatchedSession
-from bunraku.wire.messages import TimelineState
+from bunraku.wire.messages import Message, Release, TimelineState
 from tests.conftest import REPOSITORY
 from tests.simulation.simulation import simulate
 from tests.simulation.storage import NodeObjects
@@ -59,6 +60,15 @@ async def _remove_without_decision(self: SessionRegistry, session: str, revision
 _remove = SessionRegistry.remove
 
 
+def _forget_grant_at_any_release(self: Stage, puppeteer: Puppeteer, message: Message | None) -> None:
+    if isinstance(message, Release):
+        puppeteer.granted_epochs.pop(message.limb, None)
+    _receive(self, puppeteer, message)
+
+
+_receive = Stage.receive
+
+
 @contextmanager
 def _careless_takeover() -> Iterator[None]:
     with (
@@ -82,6 +92,9 @@ MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
         SessionRegistry, "remove", _remove_without_decision
     ),
     "a grant is not sent": lambda: patch.object(Stage, "_send_grant", lambda *_: None),
+    "the release of an earlier grant gives up the newer one": lambda: patch.object(
+        Stage, "receive", _forget_grant_at_any_release
+    ),
     "an edit is not published": lambda: patch.object(Stage, "_publish_timeline", _keep_timeline),
     "an acknowledged object is not stored": lambda: patch.object(NodeObjects, "put", _do_nothing),
     "a closed stage leaves its task": lambda: patch.object(Stage, "close", _do_nothing),
@@ -90,6 +103,7 @@ MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
 
 FIRST_SEEDS = {
     "a session that was handed over counts as ended": 8586,
+    "the release of an earlier grant gives up the newer one": 9731,
 }
 """Seeds that find a fault which few seeds find; 0 for all others."""
 
