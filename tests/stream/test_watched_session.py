@@ -20,7 +20,7 @@ from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.subprotocol import NOT_FOUND, CloseConnection
-from bunraku.wire.messages import Presence, Problem, TimelineState
+from bunraku.wire.messages import ChannelHeader, Description, Presence, Problem, TimelineState
 from bunraku.wire.overlay import Overlay
 from tests.stream.fake_transport import FakeTransport, parse_frames
 from tests.time_limit import HANG_TIMEOUT_S
@@ -250,6 +250,23 @@ async def test_motion_change_reaches_all_viewers(motion_store: MotionStore) -> N
         await open_session(watched)
     assert closed.value.code == NOT_FOUND
     assert all(b"No such motion" in transport.sent for _, transport in joined)
+
+
+async def test_viewer_that_joins_during_a_motion_change_gets_both_motions(motion_store: MotionStore) -> None:
+    bus = MemoryBus()
+    serve_session_state(bus)
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+    viewer, transport = ViewerConnection(watched._context), FakeTransport()
+    other = timeline.change_motion(STATE, 5_000, "n", 2_000_000)
+    async with watched.open("s") as session:
+        # during the handshake, the motion is changed and begins to load
+        bus.publish("session.s.timeline", other.pack())
+        session.add_viewer(viewer)
+        viewer.open(transport.open_connection(viewer))
+        await session.wait_until_ready()
+    announced = [m for m in transport.messages if isinstance(m, ChannelHeader | Description | TimelineState)]
+    assert [m if isinstance(m, TimelineState) else m.motion for m in announced] == ["m", "m", STATE, "n", "n", other]
+    viewer.on_close()
 
 
 async def test_unknown_session_raises_no_response(motion_store: MotionStore) -> None:

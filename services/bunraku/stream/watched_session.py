@@ -75,7 +75,8 @@ class WatchedSession:
         # connections that overlays are written to directly, and the viewers that need a check for each overlay
         self._writable: MulticastGroup | None = None
         self._unwritable: list[ViewerConnection] = []
-        self._motion: StoredMotion | None = None
+        # timeline that the viewers have, and its motion; older than `_timeline` while a motion is loaded
+        self._current: tuple[TimelineState, StoredMotion] | None = None
         self.close_reason: CloseConnection | None = None
         """Reason why no viewer can be connected now."""
         self._motion_task: asyncio.Task[None] | None = None
@@ -118,9 +119,9 @@ class WatchedSession:
 
     def add_viewer(self, viewer: ViewerConnection) -> None:
         """Add a viewer; the session must be ready (`wait_until_ready`)."""
-        assert self._motion is not None
+        assert self._current is not None
         self._publish_count_throttled(len(self._viewers) + 1)
-        viewer.set_timeline(self._timeline, self._motion)
+        viewer.set_timeline(*self._current)
         viewer.send_control(self._presence)
         if self._overlay is not None:
             viewer.send_overlay(self._overlay)
@@ -193,8 +194,8 @@ class WatchedSession:
         self._timeline = _parse_timeline(message)
         if self._motion_task is not None:
             return
-        if self._motion is not None and self._motion.id == self._timeline.motion:
-            self._set_motion(self._motion)
+        if self._current is not None and self._current[1].id == self._timeline.motion:
+            self._set_motion(self._current[1])
         else:
             self._motion_task = asyncio.create_task(self._load_motion(), name=f"load motion of {self._subject}")
 
@@ -221,7 +222,7 @@ class WatchedSession:
             self._motion_task = None
 
     def _set_motion(self, motion: StoredMotion) -> None:
-        self._motion = motion
+        self._current = self._timeline, motion
         for viewer in self._viewers:
             viewer.set_timeline(self._timeline, motion)
 
