@@ -23,7 +23,7 @@ from bunraku.stream.sync_group import SyncGroups
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.multicast import MulticastGroup
-from bunraku.websocket.subprotocol import INTERNAL_ERROR, NOT_FOUND, CloseConnection
+from bunraku.websocket.subprotocol import INTERNAL_ERROR, NOT_FOUND, SERVICE_RESTART, CloseConnection
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Presence, TimelineState, unpack
 from bunraku.wire.overlay import Overlay
@@ -38,6 +38,7 @@ RESYNCHRONISATION_RETRY_S = 1.0
 """Interval at which the state of a session is requested again until its owner answers, seconds."""
 
 SESSION_ENDED = CloseConnection(NOT_FOUND, "Session ended", "a puppeteer has ended this session, or it was idle")
+SERVER_STOPS = CloseConnection(SERVICE_RESTART, "Server stops", "this server stops or restarts; reconnect")
 
 _log = logging.getLogger(__name__)
 
@@ -118,7 +119,12 @@ class WatchedSession:
         self._on_session_takeover(b"")
 
     def add_viewer(self, viewer: ViewerConnection) -> None:
-        """Add a viewer; the session must be ready (`wait_until_ready`)."""
+        """Add a viewer; the session must have been ready (`wait_until_ready`).
+
+        This does nothing if the session has got a `close_reason` since then: disconnect the viewer with it.
+        """
+        if self.close_reason is not None:
+            return
         assert self._current is not None
         self._publish_count_throttled(len(self._viewers) + 1)
         viewer.set_timeline(*self._current)
@@ -152,7 +158,8 @@ class WatchedSession:
         self.close()
 
     def close(self) -> None:
-        """End the subscriptions; the remaining viewers receive nothing more."""
+        """End the subscriptions; the remaining viewers receive nothing more, and no viewer can be added."""
+        self.close_reason = self.close_reason or SERVER_STOPS
         for subscription in self._subscriptions:
             subscription.unsubscribe()
         for viewer in self._viewers:
@@ -160,6 +167,8 @@ class WatchedSession:
         self._viewers.clear()
         if self._motion_task is not None:
             self._motion_task.cancel()
+            # a task that has not started yet does not do it
+            self._motion_task = None
         if self._count_timer is not None:
             self._count_timer.cancel()
         self._publish_count(0)
