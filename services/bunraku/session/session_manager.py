@@ -149,7 +149,9 @@ class SessionManager:
         """
         endpoint = self._require_endpoint(stage.id)
         async with endpoint.record_lock:
-            self._require_endpoint(stage.id)
+            if self._require_endpoint(stage.id).stage is not stage:
+                # closed meanwhile; the session was taken over again, with another stage
+                raise _lost_problem(SessionLost(stage.id, has_ended=False))
             try:
                 record = SessionRecord(self._registry.replicas.id, stage.created, state.pack(), stage.subject)
                 endpoint.revision = await self._registry.save(stage.id, record, endpoint.revision)
