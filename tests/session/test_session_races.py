@@ -150,6 +150,59 @@ async def test_removal_whose_answer_was_lost_ends_the_session(
     await require_gone(session, server, owner, other)
 
 
+async def test_end_that_waits_for_a_hand_over_is_not_acknowledged(
+    start: Callable[[], Replica], server: MemoryKeyValueStore
+) -> None:
+    leaving, other = start(), start()
+    session = (await leaving.sessions.open_session("one"))["id"]
+    leaving._running.cancel()
+    await asyncio.wait((leaving._running,))
+    # an edit whose answer is late
+    async with leaving.sessions._endpoints[session].record_lock:
+        closing = asyncio.create_task(leaving.sessions.close())
+        await asyncio.sleep(0)
+        ending = asyncio.create_task(leaving.sessions.end_session(session))
+        await asyncio.sleep(0)
+    await closing
+    with pytest.raises(ProblemError) as refused:
+        await ending
+    assert refused.value.status == 503
+    await wait_until(lambda: session in other.stages)
+    await other.sessions.stage_proxy(session).end()
+    await require_gone(session, server, other)
+
+
+async def test_edit_of_a_replaced_stage_does_not_change_the_record(
+    start: Callable[[], Replica], server: MemoryKeyValueStore
+) -> None:
+    owner = start()
+    session = (await owner.sessions.open_session("one"))["id"]
+    replaced = owner.sessions._endpoints[session]
+    # an edit whose answer is late
+    async with replaced.record_lock:
+        edited = replaced.stage.plan_edit(SessionEdit(position=300_000), None)
+        assert edited is not None
+        saving = asyncio.create_task(owner.sessions.save_record(replaced.stage, edited))
+        await asyncio.sleep(0)
+        await owner.sessions._close_stage(session)
+        owner.sessions._review(session)
+        await wait_until(lambda: session in owner.stages)
+    with pytest.raises(ProblemError) as refused:
+        await saving
+    assert refused.value.status == 503
+    entry = await server.get(session_key(session))
+    assert entry is not None
+    successor = owner.sessions._endpoints[session].stage
+    assert SessionRecord.unpack(entry.value).parse_timeline() == successor.timeline
+
+
+async def test_ends_at_the_same_time_all_succeed(start: Callable[[], Replica], server: MemoryKeyValueStore) -> None:
+    owner = start()
+    session = (await owner.sessions.open_session("one"))["id"]
+    await asyncio.gather(*(owner.sessions.end_session(session) for _ in range(3)))
+    await require_gone(session, server, owner)
+
+
 async def test_edit_whose_answer_was_lost_is_followed_by_edits_and_the_end(
     start: Callable[[], Replica], server: MemoryKeyValueStore
 ) -> None:

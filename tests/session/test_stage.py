@@ -216,6 +216,20 @@ async def test_refusal_is_repeated_to_a_puppeteer_of_a_lost_limb(stage: Stage, m
     assert not [m for m in map(unpack, aiko.received[count:]) if isinstance(m, Refusal)]
 
 
+async def test_release_of_an_earlier_grant_keeps_the_newer_one(stage: Stage) -> None:
+    aiko = join_stage(stage, "Aiko")
+    stage.receive(aiko.puppeteer, Claim(0))
+    earlier = last_grant(aiko).epoch
+    stage.receive(aiko.puppeteer, Claim(0))
+    # sent before the second grant arrived
+    stage.receive(aiko.puppeteer, Release(0, earlier))
+    assert stage.holders[0] == aiko.id
+    # she loses the limb without a message
+    stage._ownership.release(0, aiko.id, last_grant(aiko).epoch, clock())
+    stage.receive(aiko.puppeteer, Alive([0]))
+    assert [m for m in map(unpack, aiko.received) if isinstance(m, Refusal)] == [Refusal(0, "lost")]
+
+
 async def test_notices_are_sent_once_a_second(stage: Stage) -> None:
     aiko, ben = join_stage(stage, "Aiko"), join_stage(stage, "Ben")
     stage.receive(aiko.puppeteer, Claim(0))

@@ -46,6 +46,8 @@ async def watch_session(
             watched.add_viewer(viewer)
             viewer.open(connection, transport if is_measured else None)
             connection.on_ended = replica.stream.counters.add_viewer(viewer, "session", lambda: None)
+            if watched.close_reason is not None:
+                viewer.disconnect(watched.close_reason)
     except NoResponse:
         exists = await replica.context.key_values.get(f"{SESSION_KEY_PREFIX}.{session}") is not None
         transport.abort()

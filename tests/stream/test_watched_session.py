@@ -19,8 +19,8 @@ from bunraku.stream.context import StreamContext
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket.frame import Opcode, encode_frame
-from bunraku.websocket.subprotocol import NOT_FOUND, CloseConnection
-from bunraku.wire.messages import Presence, Problem, TimelineState
+from bunraku.websocket.subprotocol import NOT_FOUND, SERVICE_RESTART, CloseConnection
+from bunraku.wire.messages import ChannelHeader, Description, Presence, Problem, TimelineState
 from bunraku.wire.overlay import Overlay
 from tests.stream.fake_transport import FakeTransport, parse_frames
 from tests.time_limit import HANG_TIMEOUT_S
@@ -278,6 +278,23 @@ async def test_motion_change_reaches_all_viewers(motion_store: MotionStore) -> N
     assert all(b"No such motion" in transport.sent for _, transport in joined)
 
 
+async def test_viewer_that_joins_during_a_motion_change_gets_both_motions(motion_store: MotionStore) -> None:
+    bus = MemoryBus()
+    serve_session_state(bus)
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+    viewer, transport = ViewerConnection(watched._context), FakeTransport()
+    other = timeline.change_motion(STATE, 5_000, "n", 2_000_000)
+    async with watched.open("s") as session:
+        # during the handshake, the motion is changed and begins to load
+        bus.publish("session.s.timeline", other.pack())
+        session.add_viewer(viewer)
+        viewer.open(transport.open_connection(viewer))
+        await session.wait_until_ready()
+    announced = [m for m in transport.messages if isinstance(m, ChannelHeader | Description | TimelineState)]
+    assert [m if isinstance(m, TimelineState) else m.motion for m in announced] == ["m", "m", STATE, "n", "n", other]
+    viewer.on_close()
+
+
 async def test_unknown_session_raises_no_response(motion_store: MotionStore) -> None:
     with pytest.raises(NoResponse):
         await open_session(
@@ -367,6 +384,39 @@ async def test_close_ends_all_subscriptions_and_tasks(
     await key_values.remove("sessions.s")
     assert close_codes(transport) == []
     viewer.on_close()
+
+
+async def test_viewer_that_waits_for_the_motion_is_rejected_when_the_server_stops(motion_store: MotionStore) -> None:
+    bus = MemoryBus()
+    serve_session_state(bus)
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+    joining = asyncio.create_task(join_viewer(watched))
+    while not watched._sessions:  # noqa: ASYNC110
+        await asyncio.sleep(0)
+    await watched.close()
+    with pytest.raises(CloseConnection) as closed:
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            await joining
+    assert closed.value.code == SERVICE_RESTART
+
+
+async def test_viewer_of_a_session_that_ends_during_the_handshake_is_not_added(motion_store: MotionStore) -> None:
+    bus, key_values = MemoryBus(), MemoryKeyValueStore()
+    counts = serve_session_state(bus)
+    await key_values.put("sessions.s", b"1")
+    watched = WatchedSessions(bus, key_values, motion_store, StreamContext.create(clock))
+    viewer, transport = ViewerConnection(watched._context), FakeTransport()
+    async with watched.open("s") as session:
+        await key_values.remove("sessions.s")
+        session.add_viewer(viewer)
+        viewer.open(transport.open_connection(viewer))
+        assert session.close_reason is not None
+        viewer.disconnect(session.close_reason)
+    assert close_codes(transport) == [NOT_FOUND]
+    viewer.on_close()
+    # nothing is published for it any more
+    assert counts == []
+    assert session._refresh_timer is session._count_timer is None
 
 
 async def test_state_of_a_later_release_is_understood(motion_store: MotionStore) -> None:

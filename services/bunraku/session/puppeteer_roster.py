@@ -27,7 +27,7 @@ class Puppeteer:
 
     `send` queues one message and returns at once. `last_heard_us` is the clock time of the last message or heartbeat.
     `subject` is that of the token, None without access control.
-    `granted_limbs` are the limbs that the puppeteer was granted and has not released.
+    `granted_epochs` has the epoch of the last grant of each limb, unless the puppeteer has released it.
     """
 
     id: str
@@ -36,7 +36,7 @@ class Puppeteer:
     send: Callable[[bytes], None]
     last_heard_us: int
     subject: str | None = None
-    granted_limbs: set[int] = field(default_factory=set)
+    granted_epochs: dict[int, int] = field(default_factory=dict)
     _notice_throttle: NoticeThrottle = field(default_factory=NoticeThrottle)
     _lost_notice_us: dict[int, int] = field(default_factory=dict)
 
@@ -49,7 +49,7 @@ class Puppeteer:
     def send_limb_lost(self, limb: int, now: int) -> None:
         """Report the loss of a limb, at most once per second: an earlier report may not have arrived."""
         if (
-            limb in self.granted_limbs
+            limb in self.granted_epochs
             and now - self._lost_notice_us.get(limb, -LOST_NOTICE_INTERVAL_US) >= LOST_NOTICE_INTERVAL_US
         ):
             self._lost_notice_us[limb] = now

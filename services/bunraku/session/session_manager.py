@@ -149,7 +149,9 @@ class SessionManager:
         """
         endpoint = self._require_endpoint(stage.id)
         async with endpoint.record_lock:
-            self._require_endpoint(stage.id)
+            if self._require_endpoint(stage.id).stage is not stage:
+                # closed meanwhile; the session was taken over again, with another stage
+                raise _lost_problem(SessionLost(stage.id, has_ended=False))
             try:
                 record = SessionRecord(self._registry.replicas.id, stage.created, state.pack(), stage.subject)
                 endpoint.revision = await self._registry.save(stage.id, record, endpoint.revision)
@@ -160,13 +162,11 @@ class SessionManager:
     async def end_session(self, session: str) -> None:
         """End a session of this replica. Raises `ProblemError` if another replica owns it now.
 
-        The session has ended once its record is removed, before the stage is closed.
+        The session has ended once its record is removed, before the stage is closed. A stage that was closed meanwhile
+        may have been handed over instead: only the store knows whether the session has ended.
         """
         endpoint = self._require_endpoint(session)
         async with endpoint.record_lock:
-            if session not in self._endpoints:
-                # a request at the same time has ended it
-                return
             try:
                 await self._registry.remove(session, endpoint.revision)
             except SessionLost as lost:

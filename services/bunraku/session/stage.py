@@ -226,7 +226,9 @@ class Stage:
                 self._send_grant(puppeteer.id, answer)
                 self.presence_publisher.publish()
         elif isinstance(message, Release):
-            puppeteer.granted_limbs.discard(message.limb)
+            # a release that crossed a newer grant does not give that one up
+            if puppeteer.granted_epochs.get(message.limb) == message.epoch:
+                del puppeteer.granted_epochs[message.limb]
             if self._ownership.release(message.limb, puppeteer.id, message.epoch, now):
                 self._grant_free_limbs(now)
                 self.presence_publisher.publish()
@@ -265,7 +267,7 @@ class Stage:
 
     def _send_grant(self, puppeteer_id: str, grant: LimbGrant) -> None:
         if (puppeteer := self.puppeteers.get(puppeteer_id)) is not None:
-            puppeteer.granted_limbs.add(grant.limb)
+            puppeteer.granted_epochs[grant.limb] = grant.epoch
             puppeteer.send(Grant(grant.limb, grant.epoch).pack())
         self._has_grants.set()
 

@@ -144,7 +144,7 @@ def create_app(context: ServiceContext) -> FastAPI:
                         context.authenticator.register_connection(access_of(socket), viewer.disconnect),
                     )
                     if watched.close_reason is not None:
-                        # it has ended during the handshake
+                        # it has ended, or the server stops, since the handshake began
                         viewer.disconnect(watched.close_reason)
             except NoResponse:
                 raise await _explain_unanswered_session(context.key_values, session) from None

@@ -23,7 +23,7 @@ from bunraku.stream.sync_group import SyncGroups
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.multicast import MulticastGroup
-from bunraku.websocket.subprotocol import INTERNAL_ERROR, NOT_FOUND, CloseConnection
+from bunraku.websocket.subprotocol import INTERNAL_ERROR, NOT_FOUND, SERVICE_RESTART, CloseConnection
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Presence, TimelineState, unpack
 from bunraku.wire.overlay import Overlay
@@ -40,6 +40,7 @@ CONCURRENT_RESYNCHRONISATIONS = 16
 """Requests for the states of sessions that are sent at the same time, after a reconnection to the bus."""
 
 SESSION_ENDED = CloseConnection(NOT_FOUND, "Session ended", "a puppeteer has ended this session, or it was idle")
+SERVER_STOPS = CloseConnection(SERVICE_RESTART, "Server stops", "this server stops or restarts; reconnect")
 
 _log = logging.getLogger(__name__)
 
@@ -77,7 +78,8 @@ class WatchedSession:
         # connections that overlays are written to directly, and the viewers that need a check for each overlay
         self._writable: MulticastGroup | None = None
         self._unwritable: list[ViewerConnection] = []
-        self._motion: StoredMotion | None = None
+        # timeline that the viewers have, and its motion; older than `_timeline` while a motion is loaded
+        self._current: tuple[TimelineState, StoredMotion] | None = None
         self.close_reason: CloseConnection | None = None
         """Reason why no viewer can be connected now."""
         self._motion_task: asyncio.Task[None] | None = None
@@ -119,10 +121,15 @@ class WatchedSession:
         self._on_session_takeover(b"")
 
     def add_viewer(self, viewer: ViewerConnection) -> None:
-        """Add a viewer; the session must be ready (`wait_until_ready`)."""
-        assert self._motion is not None
+        """Add a viewer; the session must have been ready (`wait_until_ready`).
+
+        This does nothing if the session has got a `close_reason` since then: disconnect the viewer with it.
+        """
+        if self.close_reason is not None:
+            return
+        assert self._current is not None
         self._publish_count_throttled(len(self._viewers) + 1)
-        viewer.set_timeline(self._timeline, self._motion)
+        viewer.set_timeline(*self._current)
         viewer.send_control(self._presence)
         if self._overlay is not None:
             viewer.send_overlay(self._overlay)
@@ -153,7 +160,8 @@ class WatchedSession:
         self.close()
 
     def close(self) -> None:
-        """End the subscriptions; the remaining viewers receive nothing more."""
+        """End the subscriptions; the remaining viewers receive nothing more, and no viewer can be added."""
+        self.close_reason = self.close_reason or SERVER_STOPS
         for subscription in self._subscriptions:
             subscription.unsubscribe()
         for viewer in self._viewers:
@@ -161,6 +169,8 @@ class WatchedSession:
         self._viewers.clear()
         if self._motion_task is not None:
             self._motion_task.cancel()
+            # a task that has not started yet does not do it
+            self._motion_task = None
         if self._count_timer is not None:
             self._count_timer.cancel()
         self._publish_count(0)
@@ -195,8 +205,8 @@ class WatchedSession:
         self._timeline = _parse_timeline(message)
         if self._motion_task is not None:
             return
-        if self._motion is not None and self._motion.id == self._timeline.motion:
-            self._set_motion(self._motion)
+        if self._current is not None and self._current[1].id == self._timeline.motion:
+            self._set_motion(self._current[1])
         else:
             self._motion_task = asyncio.create_task(self._load_motion(), name=f"load motion of {self._subject}")
 
@@ -223,7 +233,7 @@ class WatchedSession:
             self._motion_task = None
 
     def _set_motion(self, motion: StoredMotion) -> None:
-        self._motion = motion
+        self._current = self._timeline, motion
         for viewer in self._viewers:
             viewer.set_timeline(self._timeline, motion)
 
