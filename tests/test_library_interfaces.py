@@ -7,6 +7,7 @@ library in `pyproject.toml`.
 from __future__ import annotations
 
 import inspect
+import re
 import tomllib
 from collections.abc import Callable
 from importlib.metadata import version
@@ -24,7 +25,7 @@ from numba import config as numba_config
 from numba import types as numba_types
 from packaging.requirements import Requirement
 from starlette.routing import Route
-from uvicorn.protocols.http.h11_impl import H11Protocol
+from uvicorn.protocols.http.h11_impl import H11Protocol, RequestResponseCycle
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from uvicorn.server import ServerState
 from websockets.streams import StreamReader
@@ -86,6 +87,11 @@ async def test_http_protocol_has_the_attributes_that_the_header_timeout_uses() -
     assert hasattr(protocol.loop, "call_later")
     # set by connection_made
     assert protocol.transport is None
+
+
+def test_http_response_uses_the_transport_only_as_its_substitute_allows() -> None:
+    used = set(re.findall(r"self\.transport\.(\w+)", inspect.getsource(RequestResponseCycle)))
+    assert used == {"write", "close", "is_closing"}
 
 
 async def test_websocket_protocol_has_the_attributes_that_the_handoff_uses() -> None:

@@ -223,3 +223,15 @@ async def test_forged_address_does_not_evade_a_limit(
             ]
     assert statuses[:BURST] == [401] * BURST
     assert (429 in statuses) is limited
+
+
+async def test_rejected_body_does_not_harm_other_requests(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The gateway sends the requests of all clients on the same connections to a service."""
+    with (
+        run_server(tmp_path / "data") as url,
+        run_gateway(tmp_path, int(url.rpartition(":")[2]), monkeypatch) as port,
+    ):
+        async with httpx2.AsyncClient(base_url=f"http://127.0.0.1:{port}") as http:
+            for _ in range(5):
+                assert (await http.post("/v1/nothing", content=bytes(200_000))).status_code == 404
+                assert (await http.post("/v1/solve", json={})).status_code in (400, 422)

@@ -92,6 +92,33 @@ async def test_connection_continues_after_the_rest_of_a_body(url: str) -> None:
     writer.close()
 
 
+@pytest.mark.parametrize("fields", [b"Content-Length: 200000\r\n", b"Transfer-Encoding: chunked\r\n"])
+async def test_connection_with_a_long_rest_of_a_body_is_not_used_again(url: str, fields: bytes) -> None:
+    """A proxy would send the next request of another client on it."""
+    reader, writer = await open_connection(url)
+    writer.write(b"POST /v1/nothing HTTP/1.1\r\nHost: stage\r\n" + fields + b"\r\n30d40\r\n" + b"x" * 1_000)
+    response = (await read_until_closed(reader)).lower()
+    assert response.startswith(b"http/1.1 404")
+    assert response.count(b"connection: close") == 1
+    writer.close()
+
+
+async def test_response_is_received_by_a_client_that_closes_and_still_sends(url: str) -> None:
+    parts = urlsplit(url)
+    assert parts.hostname is not None
+    head = b"POST /v1/nothing HTTP/1.1\r\nHost: stage\r\nConnection: close\r\nContent-Length: 4000000\r\n\r\n"
+    with socket.create_connection((parts.hostname, parts.port or 80), HANG_TIMEOUT_S) as client:
+        await asyncio.to_thread(client.sendall, head)
+        assert (await asyncio.to_thread(client.recv, 12)) == b"HTTP/1.1 404"
+        # the connection is open for what is still sent: data to a closed one would be answered with a reset
+        for _ in range(3):
+            await asyncio.to_thread(client.sendall, bytes(100_000))
+        received = b""
+        while more := await asyncio.to_thread(client.recv, 65_536):
+            received += more
+        assert received.endswith(b"}")
+
+
 async def exchange(url: str, *pieces: bytes) -> bytes:
     """Send `pieces` and return all data until the server ends the connection."""
     reader, writer = await open_connection(url)

@@ -8,7 +8,7 @@ import logging
 import time
 from enum import Enum, auto
 from http import HTTPStatus
-from typing import Any
+from typing import Any, cast
 
 import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -31,8 +31,6 @@ suggests, so the number adapts to the time that the last piece took."""
 SEND_BUFFER_BYTES = 64 << 10
 """Kernel send buffer of a connection. Requests of a client that does not read wait once it is full; by default it would
 grow to megabytes. It suffices for 1 MB/s at a round-trip time of 100 ms."""
-MAX_REST_BYTES = 64 << 10
-"""Longest body of which the rest is read after the response, so that the connection can continue."""
 PARSE_TIME_S = 1e-3
 """Time after which parsing of a connection's data pauses for other connections."""
 
@@ -49,6 +47,22 @@ class HttpLoad:
         """Connections without a complete request head, the oldest first."""
         # a request costs far more than its head: one is begun in each iteration of the event loop
         self.input = InputScheduler(0)
+
+
+class _ResponseTransport:
+    """Transport as uvicorn's response uses it: closing it does not discard the response."""
+
+    def __init__(self, protocol: HttpProtocol) -> None:
+        self._protocol = protocol
+
+    def write(self, data: bytes) -> None:
+        self._protocol.transport.write(data)
+
+    def is_closing(self) -> bool:
+        return self._protocol.transport.is_closing()
+
+    def close(self) -> None:
+        self._protocol.close_after_response()
 
 
 class _Turn(Enum):
@@ -99,6 +113,8 @@ class HttpProtocol(H11Protocol):
         """Begin the next request of the parsed data, or wait for a turn to do so after a response."""
         if self._turn is _Turn.TAKEN:
             super().handle_events()
+            if self.cycle is not None:
+                self.cycle.transport = cast(asyncio.Transport, _ResponseTransport(self))
         elif self._turn is _Turn.NONE:
             self._await_turn()
 
@@ -120,16 +136,24 @@ class HttpProtocol(H11Protocol):
         self.transport.abort()
 
     def on_response_complete(self) -> None:
-        super().on_response_complete()
-        if self.conn.their_state is not h11.SEND_BODY or self.transport.is_closing():
+        if self.transport.get_protocol() is not self:
+            # the connection ends with this response
             return
-        if self._rest_of_body_is_small():
+        super().on_response_complete()
+        if self.conn.their_state is h11.SEND_BODY and not self.transport.is_closing():
             self._update_timeout()
-        else:
-            # parsing it could cost any amount of time
-            self._cancel_timeout()
-            self._unparsed.clear()
-            LingeringClose(self.transport, self.connection_lost)
+
+    def close_after_response(self) -> None:
+        """Close the connection; if the client still sends a body, once it has had time to read the response."""
+        if self.conn.their_state is not h11.SEND_BODY or self.transport.is_closing():
+            self.transport.close()
+            return
+        # parsing the rest could cost any amount of time
+        self._cancel_timeout()
+        self._unparsed.clear()
+        if self.transport.can_write_eof():
+            self.transport.write_eof()
+        LingeringClose(self.transport, self.connection_lost)
 
     def handle_websocket_upgrade(self, event: h11.Request) -> None:
         self._cancel_timeout()
@@ -181,7 +205,7 @@ class HttpProtocol(H11Protocol):
     def _parse(self) -> None:
         begun_at = piece_begun_at = time.perf_counter()
         # a request may have been parsed before the response to the last one
-        super().handle_events()
+        self.handle_events()
         while self._unparsed and self.transport.get_protocol() is self:
             piece = bytes(self._unparsed[: self._parse_bytes])
             del self._unparsed[: len(piece)]
@@ -210,11 +234,6 @@ class HttpProtocol(H11Protocol):
             h11.EndOfMessage(),
         )
         return b"".join(self.conn.send(event) or b"" for event in events)
-
-    def _rest_of_body_is_small(self) -> bool:
-        """Return whether the connection can continue after the rest of an answered request's body."""
-        length = dict(self.headers).get(b"content-length", b"")
-        return length.isdigit() and int(length) <= MAX_REST_BYTES
 
     def _update_timeout(self) -> None:
         """Start or cancel the timer according to the state of the HTTP connection."""

@@ -16,6 +16,8 @@ MAX_FIELDS = 100
 """Maximum number of header fields."""
 MAX_FRAMING_BYTES = 128 << 10
 """Maximum number of bytes received beyond the body, besides `MAX_FRAMING_SHARE`; it includes data not parsed yet."""
+MAX_REST_BYTES = 64 << 10
+"""Longest body of which the rest is read after the response, so that the connection can continue."""
 MAX_FRAMING_SHARE = 8
 """Maximum size of the framing of a chunked body, in sizes of the body. Chunks of one byte need five."""
 
@@ -23,7 +25,9 @@ MAX_FRAMING_SHARE = 8
 class BoundedConnection(h11.Connection):
     """Server side of an HTTP/1.1 connection that rejects heads which are too large or ambiguous, and endless framing.
 
-    `next_event` raises `h11.RemoteProtocolError` with the status of the response, and `error` keeps it.
+    `next_event` raises `h11.RemoteProtocolError` with the status of the response, and `error` keeps it. A response to a
+    body that is too long to be read to its end says that the connection closes (RFC 9112, section 9.3): otherwise a
+    proxy would send the request of another client on it.
     """
 
     def __init__(self) -> None:
@@ -33,6 +37,20 @@ class BoundedConnection(h11.Connection):
         """True if the response to the present request has no body (RFC 9110, section 9.3.2)."""
         self._received_bytes = self._body_bytes = 0
         self._chunk_limit = ChunkLimit()
+        self._is_body_short = True
+
+    @property
+    def has_long_rest(self) -> bool:
+        """True while the rest of a request's body is missing and may be long."""
+        return self.their_state is h11.SEND_BODY and not self._is_body_short
+
+    def send(self, event: h11.Event) -> bytes | None:  # type: ignore[override]
+        if isinstance(event, h11.Response) and self.has_long_rest:
+            kept = [(name, value) for name, value in event.headers if name != b"connection"]
+            event = h11.Response(
+                status_code=event.status_code, headers=[*kept, (b"connection", b"close")], reason=event.reason
+            )
+        return super().send(event)
 
     def receive_data(self, data: bytes) -> None:
         self._received_bytes += len(data)
@@ -51,6 +69,8 @@ class BoundedConnection(h11.Connection):
                 self._chunk_limit = ChunkLimit()
                 self.is_head_request = event.method == b"HEAD"
                 check_request_head(event)
+                length = dict(event.headers).get(b"content-length", b"")
+                self._is_body_short = length.isdigit() and int(length) <= MAX_REST_BYTES
                 if _is_websocket_upgrade(event) and self.trailing_data[0]:
                     _reject("data follows a WebSocket handshake before its response", 400)
         except h11.RemoteProtocolError as error:
