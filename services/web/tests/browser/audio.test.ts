@@ -41,7 +41,7 @@ const CLICK_COUNT = IS_BENCH ? 80 : 30;
 
 const FLAGS = ["--autoplay-policy=no-user-gesture-required"];
 
-describeInBrowser("sound", { server: "open", browser: FLAGS }, (fixture) => {
+describeInBrowser("sound", { server: "open", browser: FLAGS, fullFrameRate: true }, (fixture) => {
   let silent: { id: string; duration: number };
   let motion: { id: string; duration: number };
 

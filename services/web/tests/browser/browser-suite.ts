@@ -4,6 +4,7 @@ import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, describe, inject, onTestFinished } from "vitest";
 import { chromiumPath, connectToChromium } from "./chromium";
 import type { ServerKind, SharedServer } from "./shared-resources";
+import { SLOW_FRAME_INTERVAL_MS, slowDownDisplay } from "./slow-display";
 
 /** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
 export const PAGE_TIMEOUT_MS = 120_000;
@@ -35,6 +36,8 @@ interface SuiteOptions {
   server: ServerKind;
   /** Command line options of the browser. */
   browser?: string[];
+  /** Draw at the full frame rate, for tests that measure frames. Other pages draw at 10 Hz. */
+  fullFrameRate?: boolean;
   /** Time limit of each test, in milliseconds. */
   timeout?: number;
 }
@@ -46,7 +49,7 @@ if (!isInstalled && process.env["CI"])
 /** Define a suite of browser tests. Where Chromium is not installed, it is skipped with a warning. */
 export function describeInBrowser(
   name: string,
-  { server: kind, browser: flags = [], timeout = 3 * PAGE_TIMEOUT_MS }: SuiteOptions,
+  { server: kind, browser: flags = [], fullFrameRate = false, timeout = 3 * PAGE_TIMEOUT_MS }: SuiteOptions,
   defineTests: (fixture: BrowserFixture) => void,
 ): void {
   if (!isInstalled) console.warn(`browser tests of ${name} skipped: Chromium is not installed`);
@@ -120,6 +123,7 @@ export function describeInBrowser(
         page.on("pageerror", (error) => {
           throw error;
         });
+        if (!fullFrameRate) await page.addInitScript(slowDownDisplay, SLOW_FRAME_INTERVAL_MS);
         await before?.(page);
         const url = pageAddress(address, server.url, session);
         // A page whose address names no session does this itself.
