@@ -20,7 +20,7 @@ from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import COROUTINE_TIMEOUT_S, HANG_TIMEOUT_S
 
 # the duration of an example depends more on the machine than on the code
-hypothesis.settings.register_profile("bunraku", deadline=None)
+hypothesis.settings.register_profile("bunraku", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
 hypothesis.settings.load_profile("bunraku")
 
 # the default of 5 s suits interactive use, not a loaded machine
