@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import contextlib
+import gc
 import re
 import resource
+import socket
 from pathlib import Path
 
 import httpx2
@@ -80,6 +83,18 @@ async def test_page_process_describes_the_whole_api(tmp_path: Path, server: str)
             assert (await http.get("/v1/openapi.json")).json()["paths"] == description
             assert (await http.get("/readyz")).json() == {"status": "ready"}
             assert (await http.get("/v1/motions")).status_code != 200
+
+
+def test_server_that_is_cancelled_closes_its_connections(tmp_path: Path) -> None:
+    with contextlib.ExitStack() as clients:
+        with run_server(tmp_path) as url:
+            port = int(url.rpartition(":")[2])
+            opened = [clients.enter_context(socket.create_connection(("127.0.0.1", port))) for _ in range(3)]
+            for client in opened:
+                client.sendall(b"GET /v1/health HTTP/1.1\r\nHost: a\r\n\r\n")
+                assert client.recv(12) == b"HTTP/1.1 200"
+        # a transport that was not closed warns when it is collected, and the warning fails this test
+        gc.collect()
 
 
 def test_server_raises_the_open_file_limit(tmp_path: Path) -> None:

@@ -198,12 +198,17 @@ class _Server(uvicorn.Server):
 
     def __init__(self, config: uvicorn.Config, max_connections: int, on_ready: Callable[[], None]) -> None:
         super().__init__(config)
-        self.server_state.connections = OpenConnections(max_connections)
+        self._connections = self.server_state.connections = OpenConnections(max_connections)
         self._on_ready = on_ready
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)
         self._on_ready()
+
+    def abort_connections(self) -> None:
+        """End the connections that remain: those accepted while it stopped, and all if it was cancelled."""
+        for connection in tuple(self._connections):
+            connection.abort()
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -245,7 +250,11 @@ async def serve(
                 server_header=False,
                 timeout_graceful_shutdown=SHUTDOWN_TIMEOUT_S,
             )
-            await _Server(config, max_connections, on_ready).serve(sockets=[listening_socket])
+            server = _Server(config, max_connections, on_ready)
+            try:
+                await server.serve(sockets=[listening_socket])
+            finally:
+                server.abort_connections()
 
 
 def _raise_open_file_limit() -> int:
