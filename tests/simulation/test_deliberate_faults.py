@@ -115,6 +115,7 @@ MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
 
 
 FIRST_SEEDS = {
+    "a take-over ignores the revision of the record": 63,
     "a session that was handed over counts as ended": 8586,
     "the release of an earlier grant gives up the newer one": 9731,
     "a viewer joins with a timeline whose motion is not loaded": 2654,
