@@ -91,6 +91,19 @@ def test_replay_from_a_time_skips_finished_segments() -> None:
     assert len(list(log.replay(lambda _: [FIGURE], poses_at, begins[2]))) < len(complete) / 2
 
 
+def test_log_from_a_time_replays_the_same_overlays() -> None:
+    log = InputLog()
+    record_control(log, 400)
+    for begin in (0, 125 * FRAME_INTERVAL_US, 250 * FRAME_INTERVAL_US, 1 << 50):
+        part = InputLog.unpack(log.pack(begin))
+        expected = dict(log.replay(lambda _: [FIGURE], poses_at, begin))
+        replayed = dict(part.replay(lambda _: [FIGURE], poses_at, begin))
+        assert replayed.keys() == expected.keys()
+        assert all(overlay_bytes(replayed[due]) == overlay_bytes(expected[due]) for due in expected)
+        assert part.complete_from_us <= begin
+        assert begin == 0 or len(log.pack(begin)) < len(log.pack())
+
+
 def test_log_is_bounded_and_its_rest_replays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(logs, "MAX_LOG_BYTES", 8_000)
     log = InputLog("one")

@@ -128,15 +128,17 @@ class InputLog:
                 break
             self._complete_from_us = max(self._complete_from_us, min(self._segments[0].begin_us, now))
 
-    def pack(self) -> bytes:
-        """Return the log as bytes."""
-        segments = [[list(s.epochs), s.motion_index, s.begin_us, bytes(s.records)] for s in self._segments]
+    def pack(self, begin_us: int = 0) -> bytes:
+        """Return the log as bytes, without the segments that ended before clock time `begin_us`."""
+        kept = list(self._segments_from(begin_us))
+        is_whole = len(kept) == len(self._segments)
+        segments = [[list(s.epochs), s.motion_index, s.begin_us, s.records] for s in kept]
         timelines = [state.pack() for state in self.timelines]
         values = {
             "names": self._names,
             "timelines": timelines,
             "passages": segments,
-            "known_from": self._complete_from_us,
+            "known_from": self._complete_from_us if is_whole else max(self._complete_from_us, kept[0].begin_us),
         }
         packed: bytes = msgpack.packb(values)
         return MAGIC + packed
@@ -169,12 +171,16 @@ class InputLog:
 
         Segments that ended before clock time `begin_us` are left out. Raises `CorruptInputLog`.
         """
-        segments = tuple(self._segments)
-        for segment, following in zip_longest(segments, segments[1:]):
-            if following is not None and following.begin_us <= begin_us:
-                continue
+        for segment in self._segments_from(begin_us):
             marionettes = Marionettes(find_figures(self._name_at(segment.motion_index)), segment.epochs)
             yield from self._replay_segment(marionettes, segment.records, find_figures, find_poses)
+
+    def _segments_from(self, begin_us: int) -> Iterator[LogSegment]:
+        """Yield the segments that had not ended at clock time `begin_us`."""
+        segments = tuple(self._segments)
+        for segment, following in zip_longest(segments, segments[1:]):
+            if following is None or following.begin_us > begin_us:
+                yield segment
 
     def _replay_segment(
         self, marionettes: Marionettes, records: bytearray, find_figures: FigureLookup, find_poses: PoseLookup

@@ -133,8 +133,9 @@ class StageEndpoint:
         stage, end = self.stage, self._clock()
         duration_s = seconds or min(stage.timeline.duration * 1e-6, MAX_RECORDING_S)
         name = f"{stage.id[:12]}-{secrets.token_hex(12)}"
-        await self._context.motion_store.put_log(name, stage.log.pack())
-        return {"log": name, "begin": max(end - round(duration_s * 1e6), stage.created), "end": end}
+        begin = max(end - round(duration_s * 1e6), stage.created)
+        await self._context.motion_store.put_log(name, stage.log.pack(begin))
+        return {"log": name, "begin": begin, "end": end}
 
     async def _answer_end(self, _: None) -> None:
         await self._owner.end_session(self.stage.id)
