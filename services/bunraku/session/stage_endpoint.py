@@ -20,6 +20,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.http.token_bucket import KeyedTokenBuckets
 from bunraku.messaging.bus import Subscription
 from bunraku.messaging.recording_request import MAX_RECORDING_S
+from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US
 from bunraku.playout.timeline import position_at
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
@@ -134,7 +135,8 @@ class StageEndpoint:
         duration_s = seconds or min(stage.timeline.duration * 1e-6, MAX_RECORDING_S)
         name = f"{stage.id[:12]}-{secrets.token_hex(12)}"
         begin = max(end - round(duration_s * 1e6), stage.created)
-        await self._context.motion_store.put_log(name, stage.log.pack(begin))
+        # what viewers saw at the begin may have ended just before
+        await self._context.motion_store.put_log(name, stage.log.pack(begin - OVERLAY_HOLD_US))
         return {"log": name, "begin": begin, "end": end}
 
     async def _answer_end(self, _: None) -> None:
