@@ -32,9 +32,9 @@ async def test_membership_lasts_until_resend_or_change_of_levels(motion: StoredM
     time = VirtualTime()
     state = timeline.start(motion.id, motion.first_track.duration_us, time.now, loop=True)
     delivery, next_due = fully_sent_delivery(motion, state, time.now)
-    membership = SyncMembership(SyncedViewer(time.context, motion, state, None).viewer, 0)
+    viewer, membership = SyncedViewer(time.context, motion, state, None).viewer, SyncMembership(0)
     assert not membership.is_valid(time.now, delivery.allocation)
-    assert membership.join(SyncGroups(time.context), state, delivery, next_due)
+    assert membership.join(viewer, SyncGroups(time.context), state, delivery, next_due)
     assert membership.group is not None
     assert time.now + MIN_SYNC_US - SEND_SPREAD_US <= membership.expires_at
     assert membership.expires_at < time.now + motion.first_track.duration_us
@@ -48,21 +48,21 @@ async def test_blocks_sent_to_group_are_not_sent_again_after_leaving(motion: Sto
     time = VirtualTime()
     state = timeline.start(motion.id, motion.first_track.duration_us, time.now, loop=True)
     delivery, next_due = fully_sent_delivery(motion, state, time.now)
-    each = SyncedViewer(time.context, motion, state, FakeViewerGroup(time.context))
-    membership = SyncMembership(each.viewer, 0)
-    assert membership.join(SyncGroups(time.context), state, delivery, next_due)
+    viewer = SyncedViewer(time.context, motion, state, FakeViewerGroup(time.context)).viewer
+    membership = SyncMembership(0)
+    assert membership.join(viewer, SyncGroups(time.context), state, delivery, next_due)
     group = membership.group
     assert group is not None
     group.tick()
     group.tick()
     due = group.next_due
     assert due is not None
-    membership.leave(delivery)
+    membership.leave(viewer, delivery)
     assert membership.group is None
     levels = SendPolicy(delivery.allocation.motion_level, delivery.allocation.audio_level)
     assert delivery.scheduler.next_block(state, due - 2 * SCHEDULING_MARGIN_US, levels) is None
     # leaving without a group has no effect
-    membership.leave(delivery)
+    membership.leave(viewer, delivery)
 
 
 async def test_viewer_that_holds_next_blocks_does_not_join(motion: StoredMotion) -> None:
@@ -71,6 +71,6 @@ async def test_viewer_that_holds_next_blocks_does_not_join(motion: StoredMotion)
     delivery, next_due = fully_sent_delivery(motion, state, time.now)
     for index in range(motion.first_track.block_count):
         delivery.scheduler.mark_sent(0, index, delivery.allocation.motion_level)
-    membership = SyncMembership(SyncedViewer(time.context, motion, state, None).viewer, 0)
-    assert not membership.join(SyncGroups(time.context), state, delivery, next_due)
+    viewer, membership = SyncedViewer(time.context, motion, state, None).viewer, SyncMembership(0)
+    assert not membership.join(viewer, SyncGroups(time.context), state, delivery, next_due)
     assert membership.group is None

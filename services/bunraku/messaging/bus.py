@@ -122,10 +122,13 @@ class CallbackSubscription:
     """A subscription that a callback ends."""
 
     def __init__(self, unsubscribe: Callable[[], None]) -> None:
-        self._unsubscribe = unsubscribe
+        self._unsubscribe: Callable[[], None] | None = unsubscribe
 
     def unsubscribe(self) -> None:
-        self._unsubscribe()
+        # without the callback, the subscriber is freed at once
+        unsubscribe, self._unsubscribe = self._unsubscribe, None
+        if unsubscribe is not None:
+            unsubscribe()
 
 
 class MemoryBus:

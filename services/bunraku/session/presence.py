@@ -30,6 +30,8 @@ class PresencePublisher:
 
     def close(self) -> None:
         """Send nothing more."""
+        # drop the reference to the stage, so that both are freed at once
+        self._send = _send_nothing
         for timer in (self._viewer_count_timer, self._timer):
             if timer is not None:
                 timer.cancel()
@@ -80,3 +82,7 @@ class PresencePublisher:
         self._viewer_count_timer = None
         if published_count != self.viewer_count:
             self._publish_viewer_count()
+
+
+def _send_nothing() -> None:
+    pass

@@ -92,6 +92,8 @@ class StageEndpoint:
             subscription.unsubscribe()
         self._sweep_task.cancel()
         await asyncio.wait((self._sweep_task,))
+        # its exception refers to this object: without the reference both are freed at once
+        del self._sweep_task
         for puppeteer in self.stage.puppeteers:
             puppeteer.send(b"")
         await self.stage.close()

@@ -191,18 +191,19 @@ class SyncGroups:
 class SyncMembership:
     """Membership of one viewer in a group, and its end."""
 
-    __slots__ = ("_member", "expires_at", "group", "phase")
+    __slots__ = ("expires_at", "group", "phase")
 
-    def __init__(self, member: SyncMember, phase: int) -> None:
+    def __init__(self, phase: int) -> None:
         """`phase` is the delay with which due blocks are sent to the viewer, microseconds."""
-        self._member = member
         self.phase = phase
         self.group: SyncGroup | None = None
         """Present group, whose blocks are written to the viewer too."""
         self.expires_at = 0
         """Time at which the viewer has to leave the group."""
 
-    def join(self, groups: SyncGroups, state: TimelineState, delivery: MotionDelivery, next_due: int) -> bool:
+    def join(
+        self, member: SyncMember, groups: SyncGroups, state: TimelineState, delivery: MotionDelivery, next_due: int
+    ) -> bool:
         """Join a group if the viewer can stay in it for `MIN_SYNC_US`; return True if it joined.
 
         All blocks that are due before `next_due` must have been sent.
@@ -213,7 +214,7 @@ class SyncMembership:
         if unsent_us < MIN_SYNC_US:
             return False
         parameters = SyncParameters(state, delivery.motion, delivery.allocation, delivery.track_types, delivery.tracks)
-        self.group = groups.join(self._member, parameters, next_due, self.phase)
+        self.group = groups.join(member, parameters, next_due, self.phase)
         self.expires_at = begin + unsent_us - SEND_SPREAD_US
         return self.group is not None
 
@@ -221,12 +222,12 @@ class SyncMembership:
         """Return True if the viewer may stay in its group, given its present allocation."""
         return self.group is not None and now < self.expires_at and self.group.parameters.allocation == allocation
 
-    def leave(self, delivery: MotionDelivery | None) -> None:
+    def leave(self, member: SyncMember, delivery: MotionDelivery | None) -> None:
         """Leave the group, if any, and mark the blocks received there as sent in `delivery`."""
         group, self.group = self.group, None
         if group is None:
             return
-        sent = group.leave(self._member)
+        sent = group.leave(member)
         if delivery is not None:
             for track, index, level in sent:
                 delivery.scheduler.mark_sent(track, index, level)

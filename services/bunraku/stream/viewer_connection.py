@@ -71,7 +71,7 @@ class ViewerConnection:
         self._feed = MotionFeed(options, context.clock)
         self._queue = SendQueue(context.clock)
         self._overlay_waited_at = 0
-        self._sync = SyncMembership(self, random.randrange(SEND_SPREAD_US))
+        self._sync = SyncMembership(random.randrange(SEND_SPREAD_US))
         self._heartbeat = Heartbeat()
         self._quiet_period = QuietPeriod()
         self._flow = _NO_FLOW_CONTROL
@@ -136,7 +136,7 @@ class ViewerConnection:
 
     def set_timeline(self, state: TimelineState, motion: StoredMotion) -> None:
         """Switch to a new timeline and its motion; the timeline is sent at once, blocks in the next tick."""
-        self._sync.leave(self._feed.delivery)
+        self._sync.leave(self, self._feed.delivery)
         self._feed.set_timeline(state, motion)
         if self.connection.is_writable:
             self._write(b"".join(self._feed.take_announcement(self._flow.state.is_high_rtt)))
@@ -171,7 +171,7 @@ class ViewerConnection:
 
     def on_pause(self) -> None:
         """Handle a connection that is no longer writable."""
-        self._sync.leave(self._feed.delivery)
+        self._sync.leave(self, self._feed.delivery)
         self._invalidate_writable()
 
     def on_resume(self) -> None:
@@ -209,7 +209,7 @@ class ViewerConnection:
                 if check_flow and now >= self._next_flow_check_at:
                     self._check_flow(now)
                 if self._sync.group is not None and not self._stays_in_sync(now):
-                    self._sync.leave(self._feed.delivery)
+                    self._sync.leave(self, self._feed.delivery)
                 if not self._flow.state.is_unlimited:
                     self._send_constrained(now)
                 elif self._sync.group is None:
@@ -328,7 +328,7 @@ class ViewerConnection:
         delivery, state, next_due = feed.delivery, feed.state, feed.next_block_at
         if group is None or delivery is None or state is None or next_due is None or delivery.has_unsent_choice:
             return
-        if self._sync.join(group.sync_groups, state, delivery, next_due):
+        if self._sync.join(self, group.sync_groups, state, delivery, next_due):
             feed.next_block_at = None
 
     def _stays_in_sync(self, now: int) -> bool:
@@ -383,7 +383,7 @@ class ViewerConnection:
 
     def _stop(self) -> None:
         # blocks received in the group need not be recorded: many viewers may leave at once
-        self._sync.leave(None)
+        self._sync.leave(self, None)
         self._context.scheduler.cancel(self)
         self._cancel_timer()
 

@@ -77,6 +77,27 @@ class ConnectionListener(Protocol):
         """Handle the end of the connection."""
 
 
+class _NoListener:
+    def on_message(self, message: bytes) -> None:
+        pass
+
+    def on_pong(self, payload: bytes) -> bool:  # noqa: ARG002
+        return False
+
+    def on_pause(self) -> None:
+        pass
+
+    def on_resume(self) -> None:
+        pass
+
+    def on_close(self) -> None:
+        pass
+
+
+NO_LISTENER: ConnectionListener = _NoListener()
+"""Listener for a connection that is closing, whose events concern nobody."""
+
+
 class WebSocketConnection(asyncio.Protocol):
     """Open WebSocket connection, the protocol of its transport.
 
@@ -276,9 +297,12 @@ class WebSocketConnection(asyncio.Protocol):
             self._close_timer.cancel()
         if self._write_deadline is not None:
             self._write_deadline.stop()
-        if self.on_ended is not None:
-            self.on_ended()
-        self._listener.on_close()
+        # without these references connection and listener are freed at once
+        listener, self._listener = self._listener, NO_LISTENER
+        on_ended, self.on_ended = self.on_ended, None
+        if on_ended is not None:
+            on_ended()
+        listener.on_close()
 
 
 class _TooManyFrames(Exception):

@@ -19,7 +19,13 @@ from bunraku.runtime.client_network import client_network, peer_network
 from bunraku.runtime.clock import clock
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.websocket import link, subprotocol
-from bunraku.websocket.connection import VIEWER_FRAMES, ConnectionListener, FrameLimit, WebSocketConnection
+from bunraku.websocket.connection import (
+    NO_LISTENER,
+    VIEWER_FRAMES,
+    ConnectionListener,
+    FrameLimit,
+    WebSocketConnection,
+)
 from bunraku.websocket.subprotocol import CloseConnection
 
 HANDOFF_EXTENSION = "bunraku.take"
@@ -80,6 +86,7 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
 
     def connection_lost(self, exc: Exception | None) -> None:
         self._cancel_timeout()
+        self._withdraw_extension()
         super().connection_lost(exc)
 
     def handle_connect(self, event: Request) -> None:
@@ -99,6 +106,7 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         if not self.handshake_complete or self.close_sent or self.disconnected or transport.is_closing():
             return None
         self._cancel_timeout()
+        self._withdraw_extension()
         self.stop_keepalive()
         self.connections.discard(self)
         self.transport = _DETACHED_TRANSPORT
@@ -109,6 +117,11 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         )
         transport.resume_reading()
         return connection
+
+    def _withdraw_extension(self) -> None:
+        """Remove the reference from the scope to this object, so that both are freed at once."""
+        if self.scope is not None and self.scope["extensions"] is not None:
+            self.scope["extensions"].pop(HANDOFF_EXTENSION, None)
 
     def _cancel_timeout(self) -> None:
         if self._handshake_timer is not None:
@@ -147,23 +160,4 @@ async def reject(socket: WebSocket, reason: CloseConnection) -> None:
                 await subprotocol.accept(socket)
             except CloseConnection as unsupported:
                 reason = unsupported
-        detach(socket, _RejectedClient(), limit=REJECTED_FRAMES).close_with_problem(reason)
-
-
-class _RejectedClient:
-    """Listener for a connection that is closing."""
-
-    def on_message(self, message: bytes) -> None:
-        pass
-
-    def on_pong(self, payload: bytes) -> bool:  # noqa: ARG002
-        return False
-
-    def on_pause(self) -> None:
-        pass
-
-    def on_resume(self) -> None:
-        pass
-
-    def on_close(self) -> None:
-        pass
+        detach(socket, NO_LISTENER, limit=REJECTED_FRAMES).close_with_problem(reason)
