@@ -15,10 +15,10 @@ from bunraku.ingest.motion import MotionOperation
 from bunraku.ingest.recording import RecordingOperation, parse_recording_request
 from bunraku.ingest.source_file import SourceFile
 from bunraku.ingest.worker_slots import WorkerSlots
-from bunraku.marionette.input_log import InputLog
 from bunraku.messaging.bus import NoResponse
 from bunraku.messaging.recording_request import MAX_RECORDING_S, RECORDING_SUBJECT, pack_camera
 from bunraku.playout import timeline
+from bunraku.playout.session_log import SessionLog
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
@@ -42,7 +42,7 @@ async def motion_id(context: ServiceContext, tmp_path: Path) -> str:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(2.0, 51))
     entry, _ = await MotionOperation(context, WorkerSlots()).ingest_file("dance", SourceFile(source, "Swan.bvh"))
-    log = InputLog()
+    log = SessionLog()
     log.add_timeline(timeline.start(entry.id, 2 * SECOND_US, START_CLOCK_US))
     await context.motion_store.put_log("log", log.pack())
     return entry.id

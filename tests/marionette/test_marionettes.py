@@ -5,6 +5,7 @@ import pytest
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
+from bunraku.marionette.solver.vector import JointRotations
 from bunraku.motion.skeleton import standard_figure
 from tests.marionette.fixtures import random_motion
 
@@ -87,3 +88,39 @@ def test_stage_has_one_to_four_performers(count: int) -> None:
     with pytest.raises(ValueError, match="1 to 4"):
         marionettes.set_figures([FIGURE] * count)
     assert len(marionettes) == 4
+
+
+def control_hand_and_leg(marionettes: Marionettes, begin: int) -> list[dict[int, JointRotations]]:
+    """Control a hand and a leg with hand-over and loss, until all limbs are at rest; return the overlays."""
+    shown = []
+    grants = {}
+    for frame in range(begin, begin + 160):
+        now, phase = frame * FRAME_INTERVAL_US, frame - begin
+        ownership = marionettes.ownership
+        if phase == 2:
+            grants = {limb: expect_grant(ownership.claim(limb, "ada", now)) for limb in (0, 3)}
+            ownership.ask(0, "bo", True, now)
+            for before in (frame - 2, frame - 1):
+                marionettes.observe_poses([POSES[0][before % 160 % 90]], before * FRAME_INTERVAL_US)
+        if 2 < phase < 30:
+            for limb, grant in grants.items():
+                values = (0.01 * phase, 0.2, 0.4)
+                ownership.apply_input("ada", LimbInput(limb, phase % 2, grant.epoch, phase, now, values), now)
+        if phase == 30:
+            ownership.release(0, "ada", grants[0].epoch, now)
+            assert ownership.grant_free_limbs(now)[0][0][0] == "bo"
+        if 30 < phase < 50:
+            ownership.keep_alive("bo", [0], now)
+        ownership.expire(now)
+        shown.append(marionettes.compute_overlay([POSES[0][frame % 160 % 90]], now))
+    assert ownership.is_at_rest
+    return shown
+
+
+def test_same_commands_give_the_same_overlays_whatever_came_before() -> None:
+    one, other = Marionettes([FIGURE]), Marionettes([FIGURE])
+    first = control_hand_and_leg(one, 0)
+    assert any(first)
+    assert control_hand_and_leg(other, 0) == first
+    # at rest a marionette has no memory
+    assert control_hand_and_leg(one, 320) == control_hand_and_leg(Marionettes([FIGURE]), 320)

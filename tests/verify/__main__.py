@@ -74,7 +74,7 @@ async def _run_faults(
         figures["upload_s"] = time.monotonic() - began
         demo = await client.first_session()
         assert demo is not None, "no session is open: the demo session is missing"
-    bus_latency = json.loads(await stack.exec_in_replica("stream", 1, "python", "-", "hop", stdin=PROBE_SOURCE))
+    bus_latency = json.loads(await stack.exec_in_replica("stream", 1, "python", "-", stdin=PROBE_SOURCE))
     figures |= {f"hop_{name}_ms": bus_latency[name] for name in ("p50", "p99")}
     async with open_scenario(stack, motion) as scenario:
         for viewer in scenario.viewers:

@@ -1,18 +1,13 @@
-"""Measurements inside the stack, run by the Python of the image: the source is read from standard input.
+"""Latency of messages from one publisher through the bus to a subscriber, measured inside the stack.
 
-With the argument `hop`: latency of messages from one publisher through the bus to a subscriber. With the id of a
-session: whether an input was applied to its marionette more than once, by its input log.
+The Python of the image runs it: the source is read from standard input.
 """
 
 import asyncio
 import json
-import sys
 import time
 
-import msgpack
-
 from bunraku.messaging.bus_nats import NatsBus
-from bunraku.runtime.context import open_context
 from bunraku.runtime.settings import Settings
 
 MESSAGE_COUNT = 600
@@ -47,29 +42,4 @@ async def measure_bus_latency() -> dict[str, float]:
     }
 
 
-async def count_inputs(session: str) -> dict[str, int]:
-    """Count the inputs that were applied, and those applied twice."""
-    from bunraku.marionette import input_log
-    from bunraku.marionette.recorder import CommandKind
-
-    async with open_context(Settings()) as context:
-        reply = msgpack.unpackb(await context.bus.request(f"session.{session}.log", msgpack.packb(60.0), 10.0))
-        name = reply["answer"]["log"]
-        data = await context.motion_store.get_log(name)
-        await context.motion_store.remove_log(name)
-    assert data is not None
-    seen: list[tuple[int, ...]] = []
-    for segment in input_log.InputLog.unpack(data)._segments:
-        offset = 0
-        while offset < len(segment.records):
-            kind = CommandKind(segment.records[offset])
-            layout = input_log._RECORDS[kind]
-            if kind is CommandKind.INPUT:
-                _, puppeteer, limb, _, epoch, sequence, *_ = layout.unpack_from(segment.records, offset + 1)
-                seen.append((puppeteer, limb, epoch, sequence))
-            offset += 1 + layout.size
-    return {"applied": len(seen), "twice": len(seen) - len(set(seen))}
-
-
-argument = sys.argv[1]
-print(json.dumps(asyncio.run(measure_bus_latency() if argument == "hop" else count_inputs(argument))))
+print(json.dumps(asyncio.run(measure_bus_latency())))

@@ -101,7 +101,7 @@ class MonitoredPuppeteer:
 
     def __init__(self, client: Client, session: str) -> None:
         self._client, self._session = client, session
-        self.connections = 0
+        self.connections = self.sent_inputs = 0
         self.errors: list[tuple[float, str]] = []
         """When connections were lost, and why."""
         self._task = asyncio.create_task(self._run(), name="puppeteer")
@@ -119,6 +119,7 @@ class MonitoredPuppeteer:
                     self.connections += 1
                     for tick in range(1 << 30):
                         phase = tick / 30.0
+                        self.sent_inputs += 1
                         await aiko.target("left_hand", 0.5, 0.2 * math.sin(phase), 0.4 + 0.1 * math.cos(phase))
                         await asyncio.sleep(1 / 30)
             except (ControlRefused, OSError, TimeoutError, WebSocketException) as error:

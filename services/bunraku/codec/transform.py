@@ -35,8 +35,8 @@ def forward_dct(track: Array) -> Array:
 def inverse_dct(coefficients: Array, frames: int, instants: Array) -> Array:
     """Evaluate a block at any instants.
 
-    The value at an instant is the same to the last bit, whatever other instants are requested with it: the replay of an
-    input log depends on it.
+    The value at an instant is the same to the last bit, whatever other instants are requested with it: a recording has
+    the poses that viewers saw.
 
     Args:
         coefficients: (..., count).

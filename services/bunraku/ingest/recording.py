@@ -102,9 +102,9 @@ class RecordingOperation:
         """Return the motions that a session played, by id, without those that were removed."""
 
         def read_motion_ids() -> tuple[str, ...]:
-            from bunraku.marionette.input_log import InputLog
+            from bunraku.playout.session_log import SessionLog
 
-            return InputLog.unpack(log).motions
+            return SessionLog.unpack(log).motions
 
         try:
             motion_ids = await asyncio.to_thread(read_motion_ids)

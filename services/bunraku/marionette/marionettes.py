@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from bunraku.marionette.merge import Marionette
 from bunraku.marionette.ownership import INITIAL_EPOCHS, LIMBS_PER_PERFORMER, Ownership
-from bunraku.marionette.recorder import CommandKind, CommandRecorder
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.marionette.solver.vector import JointRotations
 from bunraku.motion.rotation import Array
@@ -28,12 +27,10 @@ class Marionettes:
         self,
         figures: Sequence[Figure],
         epochs: Sequence[int] = INITIAL_EPOCHS,
-        recorder: CommandRecorder | None = None,
         solver: LimbSolver = PYTHON_SOLVER,
     ) -> None:
         """`epochs` are those of the last grants on this stage. Raises as `set_figures` does."""
-        self.ownership = Ownership(0, epochs, recorder)
-        self._recorder = recorder
+        self.ownership = Ownership(0, epochs)
         self._solver = solver
         self._marionettes: list[Marionette] = []
         self._wake_count = 0
@@ -43,18 +40,14 @@ class Marionettes:
         """Number of limbs."""
         return len(self.ownership)
 
-    def set_figures(self, figures: Sequence[Figure], motion: str = "", now: int = 0) -> list[tuple[int, str]]:
+    def set_figures(self, figures: Sequence[Figure]) -> list[tuple[int, str]]:
         """Change the performers to those of a motion; return the held limbs that disappear, and their holders.
 
         Limbs of the performers that remain stay held. Each new arm takes a tenth of a second, as in
         `Marionette.set_figure`. Raises, without effect, `ProportionsError` for a figure whose arms are too short, and
         ValueError for no figure or more than four.
         """
-        removed = self._replace_figures(figures)
-        self.ownership.record(CommandKind.FIGURES, now, motion)
-        if self._recorder is not None:
-            self._recorder.change_motion(motion)
-        return removed
+        return self._replace_figures(figures)
 
     def use_solver(self, solver: LimbSolver) -> None:
         """Use another solver from the next frame on."""
@@ -67,16 +60,14 @@ class Marionettes:
         """True if any marionette needs every frame."""
         return any(marionette.needs_full_rate for marionette in self._marionettes)
 
-    def observe_poses(self, poses: Sequence[Array], now: int, due: int = 0) -> None:
-        """Observe the rotations (18, 4) of each performer before the first overlay; `due` is their clock time."""
-        self.ownership.record(CommandKind.OBSERVE, now, due)
+    def observe_poses(self, poses: Sequence[Array], now: int) -> None:
+        """Observe the rotations (18, 4) of each performer before the first overlay."""
         self._reset_after_rest()
         for marionette, rotations in zip(self._marionettes, poses, strict=False):
             marionette.observe_pose(rotations, now)
 
-    def compute_overlay(self, poses: Sequence[Array], now: int, due: int = 0) -> OverlayJoints:
-        """Return the overlay of the rotations (18, 4) of each performer; `due` is their clock time."""
-        self.ownership.record(CommandKind.OVERLAY, now, due)
+    def compute_overlay(self, poses: Sequence[Array], now: int) -> OverlayJoints:
+        """Return the overlay of the rotations (18, 4) of each performer."""
         self._reset_after_rest()
         overlay: OverlayJoints = {}
         for performer, (marionette, rotations) in enumerate(zip(self._marionettes, poses, strict=False)):
@@ -101,7 +92,7 @@ class Marionettes:
         return self.ownership.set_limb_count(LIMBS_PER_PERFORMER * len(figures))
 
     def _reset_after_rest(self) -> None:
-        """Reset the state at rest, so that a log replays from any rest to the same overlays."""
+        """Reset the state at rest, so that the same commands give the same overlays whatever came before."""
         if self._wake_count != self.ownership.wake_count:
             self._wake_count = self.ownership.wake_count
             for marionette in self._marionettes:

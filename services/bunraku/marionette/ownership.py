@@ -14,7 +14,6 @@ from typing import Literal
 
 from bunraku.marionette.limb_rig import ALL_LIMBS, Limb
 from bunraku.marionette.limb_target import InputKind, LateInput, LimbTarget
-from bunraku.marionette.recorder import CommandKind, CommandRecorder
 from bunraku.marionette.solver.vector import Vector
 from bunraku.wire.limbs import MAX_LIMBS
 
@@ -92,17 +91,11 @@ class _LimbState:
 class Ownership:
     """Limbs of a stage and their holders: the only interface for actions of puppeteers.
 
-    Limb l of performer k has the number 4 k + l. A recorder receives every command that can have a consequence.
+    Limb l of performer k has the number 4 k + l.
     """
 
-    def __init__(
-        self,
-        limb_count: int = LIMBS_PER_PERFORMER,
-        epochs: Sequence[int] = INITIAL_EPOCHS,
-        recorder: CommandRecorder | None = None,
-    ) -> None:
+    def __init__(self, limb_count: int = LIMBS_PER_PERFORMER, epochs: Sequence[int] = INITIAL_EPOCHS) -> None:
         """`epochs` are those of the last grants, by limb."""
-        self._recorder = recorder
         # of all limbs that a stage can have, so that a limb that is removed and added again never repeats an epoch
         self._epochs = [*epochs, *INITIAL_EPOCHS[len(epochs) :]]
         self._limbs: list[_LimbState] = []
@@ -145,21 +138,12 @@ class Ownership:
         """Return the limb's target: the holder's, after a release the last one, None before the first grant."""
         return self._limbs[limb].target
 
-    def record(self, kind: CommandKind, now: int, *values: str | float) -> None:
-        """Pass a command to the recorder, unless all limbs are at rest: then it has no consequence."""
-        if self._recorder is not None and not self.is_at_rest:
-            self._recorder.append(kind, now, *values)
-
     def claim(self, limb: int, puppeteer: str, now: int) -> LimbGrant | LimbRefusal:
         """Grant a limb that is free, or the claimant's own again with a new epoch."""
         if not self._has_limb(limb):
             return LimbRefusal(limb, None, "unknown")
         if self.is_at_rest:
             self.wake_count += 1
-            if self._recorder is not None:
-                self._recorder.begin_segment(self.epochs, now)
-        if self._recorder is not None:
-            self._recorder.append(CommandKind.CLAIM, now, puppeteer, limb)
         return self._grant(limb, puppeteer, now)
 
     def release(self, limb: int, puppeteer: str, epoch: int, now: int) -> bool:
@@ -168,12 +152,10 @@ class Ownership:
         if state is None or state.epoch != epoch:
             return False
         state.release(now)
-        self.record(CommandKind.RELEASE, now, puppeteer, limb, epoch)
         return True
 
     def leave(self, puppeteer: str, now: int) -> tuple[int, ...]:
         """Free all limbs of a puppeteer, drop the puppeteer's requests, and return the freed limbs."""
-        self.record(CommandKind.LEAVE, now, puppeteer)
         freed = tuple(limb for limb, state in enumerate(self._limbs) if state.holder == puppeteer)
         for limb in freed:
             self._limbs[limb].release(now)
@@ -183,9 +165,7 @@ class Ownership:
 
     def keep_alive(self, puppeteer: str, limbs: Iterable[int], now: int) -> None:
         """Record that the puppeteer still holds `limbs` without a new input; limbs of others are ignored."""
-        known = {limb for limb in limbs if self._has_limb(limb)}
-        self.record(CommandKind.KEEP_ALIVE, now, puppeteer, sum(1 << limb for limb in known))
-        for limb in known:
+        for limb in {limb for limb in limbs if self._has_limb(limb)}:
             state = self._held_by(limb, puppeteer)
             if state is not None and state.target is not None:
                 state.target.keep_alive(now)
@@ -194,7 +174,6 @@ class Ownership:
         """Ask for a limb that another puppeteer holds, or no longer; return whether the requests have changed."""
         if not self._has_limb(limb):
             return False
-        self.record(CommandKind.ASK, now, puppeteer, limb, wanted)
         state = self._limbs[limb]
         if not wanted:
             return state.asks.pop(puppeteer, None) is not None
@@ -223,18 +202,6 @@ class Ownership:
             )
         except LateInput:
             return InputOutcome.LATE
-        self.record(
-            CommandKind.INPUT,
-            now,
-            puppeteer,
-            limb_input.limb,
-            limb_input.kind,
-            limb_input.epoch,
-            limb_input.sequence,
-            # the largest and smallest number that the log can hold
-            max(min(limb_input.sampled_us, (1 << 63) - 1), -(1 << 63)),
-            *limb_input.values,
-        )
         return InputOutcome.ACCEPTED if is_within_reach else InputOutcome.CLAMPED
 
     def grant_free_limbs(self, now: int) -> tuple[list[tuple[str, LimbGrant]], bool]:
@@ -253,10 +220,7 @@ class Ownership:
                 grant = self._grant(limb, first, now)
                 assert isinstance(grant, LimbGrant)
                 grants.append((first, grant))
-        changed = changed or bool(grants)
-        if changed:
-            self.record(CommandKind.GRANT_FREE_LIMBS, now)
-        return grants, changed
+        return grants, changed or bool(grants)
 
     def expire(self, now: int) -> list[tuple[int, str]]:
         """Free the limbs whose holders were silent for `INPUT_TIMEOUT_US`; return them with their holders."""
@@ -265,8 +229,6 @@ class Ownership:
             if state.holder is not None and state.target and now - state.target.last_heard_us >= INPUT_TIMEOUT_US:
                 lost.append((limb, state.holder))
                 state.release(now)
-        if lost:
-            self.record(CommandKind.EXPIRE, now)
         return lost
 
     def clear_target(self, limb: int) -> None:

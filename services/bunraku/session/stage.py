@@ -18,7 +18,6 @@ from dataclasses import dataclass
 import msgpack
 
 from bunraku.codec.container import StoredMotion
-from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
@@ -26,6 +25,7 @@ from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_joints
+from bunraku.playout.session_log import SessionLog
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.pose_cache import PoseCache
@@ -93,9 +93,9 @@ class Stage:
         self._sequence = 0
         self._phase_us = secrets.randbelow(FRAMES_PER_MESSAGE * FRAME_INTERVAL_US)
         self._last_overlay: bytes | None = None
-        self.log = InputLog(start.motion.id)
+        self.log = SessionLog()
         self.log.add_timeline(self.timeline)
-        self._marionettes = Marionettes(_performer_figures(start.motion), recorder=self.log, solver=solver)
+        self._marionettes = Marionettes(_performer_figures(start.motion), solver=solver)
         self._ownership = self._marionettes.ownership
         self._set_motion(start.motion)
         subject = f"session.{start.id}"
@@ -190,7 +190,7 @@ class Stage:
 
     def _change_motion(self, motion: StoredMotion) -> None:
         now = self._clock()
-        for limb, holder in self._marionettes.set_figures(_performer_figures(motion), motion.id, now):
+        for limb, holder in self._marionettes.set_figures(_performer_figures(motion)):
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
         self._set_motion(motion)
@@ -309,7 +309,7 @@ class Stage:
             for before in (frame - 2, frame - 1):
                 due = self._frame_time_us(before) + OVERLAY_LEAD_US
                 if (poses := self._pose_cache.poses_at(due, FRAME_INTERVAL_US)) is not None:
-                    self._marionettes.observe_poses(poses, self._frame_time_us(before), due)
+                    self._marionettes.observe_poses(poses, self._frame_time_us(before))
             frame_rate, lateness_us = FrameRateControl(), 0
             while self._publish_frames(
                 range(
@@ -358,11 +358,13 @@ class Stage:
         for frame in frames:
             due = self._frame_time_us(frame) + OVERLAY_LEAD_US
             poses = self._pose_cache.poses_at(due, FRAME_INTERVAL_US)
-            overlay = self._marionettes.compute_overlay(poses, self._frame_time_us(frame), due) if poses else {}
+            overlay = self._marionettes.compute_overlay(poses, self._frame_time_us(frame)) if poses else {}
             frame_overlays.append(overlay)
         self._sequence += 1
-        message = _pack_overlay(self._sequence, self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US, frame_overlays)
+        due = self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US
+        message = _pack_overlay(self._sequence, due, frame_overlays)
         self._last_overlay = message if frame_overlays[-1] else None
+        self.log.add_overlay(due, message)
         self._counters.tick_duration_s.observe(time.perf_counter() - begin_s)
         self._bus.publish(f"session.{self.id}.overlay", message)
         return not self._ownership.is_at_rest

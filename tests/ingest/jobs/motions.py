@@ -5,9 +5,9 @@ from __future__ import annotations
 from bunraku.codec import container
 from bunraku.codec.container import StoredMotion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.marionette.input_log import InputLog
 from bunraku.motion.placement import Placement
 from bunraku.motion.skeleton import Motion
+from bunraku.playout.session_log import SessionLog
 from bunraku.wire.messages import TimelineState
 from tests.vectors.blocks import random_motion
 
@@ -39,7 +39,7 @@ MOTIONS = {
 
 def make_log(*states: TimelineState) -> bytes:
     """Return the log of a session with these timelines and no input."""
-    log = InputLog()
+    log = SessionLog()
     for state in states:
         log.add_timeline(state)
     return log.pack()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
-from bunraku.marionette.input_log import InputLog
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbGrant, LimbInput
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.block_store import Pose
 from bunraku.playout.overlay_buffer import OverlayBuffer, pack_joints
+from bunraku.playout.session_log import SessionLog
 from bunraku.wire.messages import TimelineState
 from bunraku.wire.overlay import Overlay
 from tests.ingest.jobs.motions import MOTIONS, SECOND_US, START_CLOCK_US, make_log
@@ -25,10 +25,10 @@ class SimulatedSession:
     """Session with one viewer, driven tick by tick as the session service does."""
 
     def __init__(self, motion: str) -> None:
-        self.log = InputLog(motion)
+        self.log = SessionLog()
         self.state = timeline.start(motion, MOTIONS[motion].first_track.duration_us, START_CLOCK_US)
         self.log.add_timeline(self.state)
-        self.marionettes = Marionettes(figures_of(motion), recorder=self.log)
+        self.marionettes = Marionettes(figures_of(motion))
         self.clock = START_CLOCK_US
         self._viewer_overlays = OverlayBuffer()
         self._was_at_rest = True
@@ -63,18 +63,16 @@ class SimulatedSession:
         for back in (2 * TICK_US, TICK_US) if self._was_at_rest else ():
             before = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US - back)
             assert before is not None
-            self.marionettes.observe_poses(
-                [rotations for _, rotations in before], self.clock - back, self.clock + OVERLAY_LEAD_US - back
-            )
+            self.marionettes.observe_poses([rotations for _, rotations in before], self.clock - back)
         self._was_at_rest = False
         poses = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US)
         assert poses is not None
-        overlay = self.marionettes.compute_overlay(
-            [rotations for _, rotations in poses], self.clock, self.clock + OVERLAY_LEAD_US
-        )
+        overlay = self.marionettes.compute_overlay([rotations for _, rotations in poses], self.clock)
         limbs = {limb: pack_joints(joints) for limb, joints in overlay.items()}
         self._sequence += 1
-        self._viewer_overlays.put(Overlay(self._sequence, self.clock + OVERLAY_LEAD_US, limbs))
+        published = Overlay(self._sequence, self.clock + OVERLAY_LEAD_US, limbs)
+        self._viewer_overlays.put(published)
+        self.log.add_overlay(published.due, published.pack())
 
 
 def figures_of(motion: str) -> list[Figure]:
@@ -113,7 +111,7 @@ def session_controlled_twice(motion: str, second: tuple[int, ...] = (1, 2)) -> S
 @pytest.mark.parametrize(("motion", "second"), [("one", (1, 2)), ("both", (1, 5, 6))])
 def test_replay_from_any_time_equals_what_the_viewer_saw(motion: str, second: tuple[int, ...]) -> None:
     stage = session_controlled_twice(motion, second)
-    log = InputLog.unpack(stage.log.pack())
+    log = SessionLog.unpack(stage.log.pack())
     plain = SessionReplay(log, MOTIONS)
     for first in (0, 31, 60, 150, 200, 230):
         part = stage.seen_poses[first:]
@@ -145,7 +143,7 @@ def test_replay_follows_pause_seek_and_motion_change() -> None:
         elif number == 70:
             stage.edit(timeline.edit(stage.state, now + OVERLAY_LEAD_US, playing=True, position=SECOND_US // 3))
         elif number == 130:
-            stage.marionettes.set_figures(figures_of("two"), "two", now)
+            stage.marionettes.set_figures(figures_of("two"))
             stage.edit(
                 timeline.change_motion(
                     stage.state, now + OVERLAY_LEAD_US, "two", MOTIONS["two"].first_track.duration_us
@@ -153,7 +151,7 @@ def test_replay_follows_pause_seek_and_motion_change() -> None:
             )
             changed = now + OVERLAY_LEAD_US
     for part in (stage.seen_poses, [(clock, pose) for clock, pose in stage.seen_poses if clock >= changed]):
-        shown = SessionReplay(InputLog.unpack(stage.log.pack()), MOTIONS).replay_poses([clock for clock, _ in part])
+        shown = SessionReplay(SessionLog.unpack(stage.log.pack()), MOTIONS).replay_poses([clock for clock, _ in part])
         for (_, seen), again in zip(part, shown, strict=True):
             assert again is not None
             assert_same_poses(again, seen)
@@ -163,7 +161,7 @@ def test_timelines_apply_from_their_clock_time() -> None:
     one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
     sought = timeline.edit(one, START_CLOCK_US + SECOND_US, position=2 * SECOND_US)
     two = timeline.change_motion(sought, START_CLOCK_US + 2 * SECOND_US, "two", 2 * SECOND_US)
-    replay = SessionReplay(InputLog.unpack(make_log(one, sought, two)), MOTIONS)
+    replay = SessionReplay(SessionLog.unpack(make_log(one, sought, two)), MOTIONS)
     assert replay.timeline_at(START_CLOCK_US - 1) is None
     assert replay.motion_poses_at(START_CLOCK_US - 1) is None
     assert [replay.timeline_at(START_CLOCK_US + t) for t in (0, SECOND_US - 1, SECOND_US, 2 * SECOND_US)] == [
@@ -178,12 +176,12 @@ def test_timelines_apply_from_their_clock_time() -> None:
 def test_removed_motion_is_reported() -> None:
     one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
     with pytest.raises(MissingMotion, match="one was removed"):
-        list(SessionReplay(InputLog.unpack(make_log(one)), {}).replay_poses([START_CLOCK_US]))
+        list(SessionReplay(SessionLog.unpack(make_log(one)), {}).replay_poses([START_CLOCK_US]))
 
 
 def test_replay_without_input_equals_the_motion() -> None:
     one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
-    replay = SessionReplay(InputLog.unpack(make_log(one)), MOTIONS)
+    replay = SessionReplay(SessionLog.unpack(make_log(one)), MOTIONS)
     (poses,) = replay.replay_poses([START_CLOCK_US + SECOND_US])
     motion_pose = replay.motion_poses_at(START_CLOCK_US + SECOND_US)
     assert poses is not None

@@ -17,10 +17,10 @@ from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.motion import FIRST_BLOCK_S, MAX_BEST_GRADE_FRAMES
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.marionette.input_log import CorruptInputLog, InputLog
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion
+from bunraku.playout.session_log import CorruptSessionLog, SessionLog
 
 
 def encode_recording(
@@ -35,8 +35,7 @@ def encode_recording(
     `motions` are the motions that the session played, by id. If the session changed its motion in the interval, the
     recording begins at the last change. `on_progress` receives the encoded share, 0..1.
     """
-    log = InputLog.unpack(packed_log)
-    session = SessionReplay(log, motions)
+    session = SessionReplay(SessionLog.unpack(packed_log), motions)
     times = [request.begin + round(frame * 1e6 / RECORDING_FPS) for frame in range(request.frame_count)]
     states = [session.timeline_at(time) for time in times]
     last_state = states[-1]
@@ -44,18 +43,10 @@ def encode_recording(
         return JobRejection("Nothing to keep", "the session played no motion in this interval", field="seconds")
     is_other_motion = [state is None or state.motion != last_state.motion for state in states]
     times = times[1 + max((frame for frame, is_other in enumerate(is_other_motion) if is_other), default=-1) :]
-    if log.complete_from_us > times[0]:
-        seconds = max(request.end - log.complete_from_us, 0) * 1e-6
-        return JobRejection(
-            "Too long ago",
-            f"limbs were controlled for so long that only the last {seconds:.0f} s of this session can be recorded",
-            field="seconds",
-            hint="release all limbs for a moment: the log is complete from then on",
-        )
     try:
         # each of these times has a timeline and thus poses
         poses = [pose for pose in session.replay_poses(times) if pose is not None]
-    except (MissingMotion, CorruptInputLog) as error:
+    except (MissingMotion, CorruptSessionLog) as error:
         return JobRejection("Cannot be replayed", str(error))
     played = motions[last_state.motion]
     recorded = [

@@ -7,17 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from bunraku.codec.container import PerformerTracks, StoredMotion
 from bunraku.codec.motion_decoder import decode_motion_block
-from bunraku.marionette.input_log import InputLog
-from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import Figure
 from bunraku.playout.block_store import MotionBlockStore, Pose
-from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US, OverlayBuffer, pack_joints
+from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US, OverlayBuffer
+from bunraku.playout.session_log import SessionLog
 from bunraku.playout.timeline import position_at
 from bunraku.wire.messages import Data, TimelineState
-from bunraku.wire.overlay import Overlay
 
 OVERLAY_LEAD_US = 100_000
-"""Lead time with which overlays are computed before they are due, in microseconds: no viewer gets them earlier."""
+"""Lead time with which overlays are published before they are due, in microseconds: no viewer gets them earlier."""
 
 
 class MissingMotion(ValueError):
@@ -27,7 +24,7 @@ class MissingMotion(ValueError):
 class SessionReplay:
     """Stage of one session, from its log and the motions that it played, by id."""
 
-    def __init__(self, log: InputLog, motions: Mapping[str, StoredMotion]) -> None:
+    def __init__(self, log: SessionLog, motions: Mapping[str, StoredMotion]) -> None:
         self._log = log
         self._states = sorted(log.timelines, key=lambda state: state.epoch)
         self._clocks = [state.clock for state in self._states]
@@ -56,20 +53,16 @@ class SessionReplay:
     def replay_poses(self, times: Iterable[int]) -> Iterator[list[Pose] | None]:
         """Yield each performer's pose with overlays at ascending clock `times`, None before the first timeline.
 
-        Raise `MissingMotion`, and `CorruptInputLog` if the log cannot be replayed.
+        Raise `MissingMotion`, and `CorruptSessionLog` for an overlay that cannot be read.
         """
-        overlays, sequence = OverlayBuffer(), 0
-        replayed, upcoming = None, None
+        overlays, logged, upcoming = OverlayBuffer(), None, None
         for clock in times:
-            if replayed is None:
-                replayed = self._log.replay(self._figures_of, self._rotations_at, clock - OVERLAY_HOLD_US)
-                upcoming = next(replayed, None)
-            while upcoming is not None and upcoming[0] <= clock + OVERLAY_LEAD_US:
-                due, joints_by_limb = upcoming
-                packed = {limb: pack_joints(joints) for limb, joints in joints_by_limb.items()}
-                overlays.put(Overlay(sequence, due, packed))
-                sequence = (sequence + 1) & 0xFFFF
-                upcoming = next(replayed, None)
+            if logged is None:
+                logged = self._log.overlays(clock - OVERLAY_HOLD_US)
+                upcoming = next(logged, None)
+            while upcoming is not None and upcoming.due <= clock + OVERLAY_LEAD_US:
+                overlays.put(upcoming)
+                upcoming = next(logged, None)
             poses = self.motion_poses_at(clock)
             yield (
                 None
@@ -81,13 +74,6 @@ class SessionReplay:
         if motion not in self._performers_by_motion:
             raise MissingMotion(f"the motion {motion} was removed from the library")
         return self._performers_by_motion[motion]
-
-    def _figures_of(self, motion: str) -> list[Figure]:
-        return [performer.track.figure for performer in self._performers_of(motion)]
-
-    def _rotations_at(self, clock: int) -> list[Array] | None:
-        poses = self.motion_poses_at(clock)
-        return None if poses is None else [rotations for _, rotations in poses]
 
 
 class _PerformerPlayback:

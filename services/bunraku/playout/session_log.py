@@ -1,0 +1,138 @@
+"""Log of what the viewers of a session saw: its timelines and the overlays of its limbs.
+
+The overlays are the messages that the stage published, so a replay gives the poses of the viewers to the last bit. The
+log covers the last `LOG_DURATION_US`, the longest recording with a margin; what is older is dropped.
+
+As bytes: "bunraku.log/3", then a msgpack map with `timelines`, a list of messages, and `overlays`, messages with their
+lengths (u16) before them.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Self
+
+import msgpack
+
+from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.messages import TimelineState, unpack
+from bunraku.wire.overlay import Overlay
+
+MAGIC = b"bunraku.log/3"
+LOG_DURATION_US = 660_000_000
+CHUNK_DURATION_US = 10_000_000
+"""Overlays are dropped in chunks of this duration."""
+MAX_LOG_BYTES = 16 << 20
+"""Bound of the overlays: sixteen controlled limbs at the full frame rate have 12 MB in `LOG_DURATION_US`."""
+MAX_TIMELINES = 10_000
+
+_LENGTH = struct.Struct("<H")
+
+
+class CorruptSessionLog(ValueError):
+    """Bytes that are not a valid log."""
+
+
+@dataclass(slots=True)
+class _Chunk:
+    """Overlays of some seconds, the first of which is due at `begin_us`."""
+
+    begin_us: int
+    end_us: int
+    messages: bytearray = field(default_factory=bytearray)
+
+
+class SessionLog:
+    """Timelines and overlays of a session; times are clock times in microseconds."""
+
+    def __init__(self) -> None:
+        self.timelines: deque[TimelineState] = deque(maxlen=MAX_TIMELINES)
+        self._chunks: deque[_Chunk] = deque()
+        self._overlay_bytes = 0
+
+    @property
+    def motions(self) -> tuple[str, ...]:
+        """Ids of the motions of the timelines, in order."""
+        return tuple(dict.fromkeys(state.motion for state in self.timelines))
+
+    def add_timeline(self, state: TimelineState) -> None:
+        """Add a timeline of the session."""
+        self.timelines.append(state)
+        self._drop_before(state.clock - LOG_DURATION_US)
+
+    def add_overlay(self, due_us: int, message: bytes) -> None:
+        """Add a published Overlay, whose last frame is due at `due_us`; due times ascend."""
+        if not self._chunks or due_us - self._chunks[-1].begin_us >= CHUNK_DURATION_US:
+            self._chunks.append(_Chunk(due_us, due_us))
+            self._drop_before(due_us - LOG_DURATION_US)
+        chunk = self._chunks[-1]
+        chunk.end_us = due_us
+        chunk.messages += _LENGTH.pack(len(message)) + message
+        self._overlay_bytes += _LENGTH.size + len(message)
+        while self._overlay_bytes > MAX_LOG_BYTES:
+            self._drop_chunk()
+
+    def overlays(self, begin_us: int = 0) -> Iterator[Overlay]:
+        """Yield the overlays in order, without those of chunks that end before `begin_us`.
+
+        Raises `CorruptSessionLog`.
+        """
+        for chunk in self._chunks:
+            if chunk.end_us >= begin_us:
+                yield from _unpack_overlays(chunk.messages)
+
+    def pack(self, begin_us: int = 0) -> bytes:
+        """Return the log as bytes, without what viewers saw before `begin_us`."""
+        states = list(self.timelines)
+        first = max((index for index, state in enumerate(states) if state.clock <= begin_us), default=0)
+        packed: bytes = msgpack.packb(
+            {
+                "timelines": [state.pack() for state in states[first:]],
+                "overlays": b"".join(chunk.messages for chunk in self._chunks if chunk.end_us >= begin_us),
+            }
+        )
+        return MAGIC + packed
+
+    @classmethod
+    def unpack(cls, data: bytes) -> Self:
+        """Parse a log; raises `CorruptSessionLog`. Its overlays are parsed by `overlays`."""
+        if not data.startswith(MAGIC):
+            raise CorruptSessionLog(f"session log rejected: it does not begin with {MAGIC.decode()}")
+        log = cls()
+        try:
+            values = msgpack.unpackb(data[len(MAGIC) :])
+            for state in map(unpack, values["timelines"]):
+                if not isinstance(state, TimelineState):
+                    raise CorruptSessionLog("session log rejected: a message of `timelines` is not a timeline")
+                log.timelines.append(state)
+            log._chunks.append(_Chunk(0, 1 << 63, bytearray(values["overlays"])))
+        except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
+            raise CorruptSessionLog(f"session log rejected: {error}") from error
+        return log
+
+    def _drop_before(self, begin_us: int) -> None:
+        """Drop the chunks and timelines that had ended at `begin_us`."""
+        while self._chunks and self._chunks[0].end_us < begin_us:
+            self._drop_chunk()
+        while len(self.timelines) > 1 and self.timelines[1].clock <= begin_us:
+            self.timelines.popleft()
+
+    def _drop_chunk(self) -> None:
+        self._overlay_bytes -= len(self._chunks.popleft().messages)
+
+
+def _unpack_overlays(messages: bytes | bytearray) -> Iterator[Overlay]:
+    at, end = 0, len(messages)
+    while at < end:
+        try:
+            (length,) = _LENGTH.unpack_from(messages, at)
+            overlay = unpack(bytes(messages[at + _LENGTH.size : at + _LENGTH.size + length]))
+        except (struct.error, MalformedMessage) as error:
+            raise CorruptSessionLog(f"session log rejected: overlay at byte {at}: {error}") from error
+        if not isinstance(overlay, Overlay):
+            raise CorruptSessionLog(f"session log rejected: the message at byte {at} is not an overlay")
+        yield overlay
+        at += _LENGTH.size + length
