@@ -122,7 +122,7 @@ def _restricted_environment() -> Iterator[None]:
     read it. `os.environ` stays as it is.
     """
     try:
-        environment = ctypes.c_void_p.in_dll(ctypes.CDLL(None), "environ")
+        environment = ctypes.c_void_p.in_dll(ctypes.pythonapi, "environ")
     except ValueError:
         _log.warning("The environment of workers cannot be restricted on this system")
         yield
