@@ -34,7 +34,7 @@ print(urllib.request.urlopen(request, timeout=20).read().decode())
 
 _METRICS_SCRIPT = """
 import urllib.request
-print(urllib.request.urlopen("http://127.0.0.1:8000/metrics", timeout=20).read().decode())
+print(urllib.request.urlopen("http://127.0.0.1:9100/metrics", timeout=20).read().decode())
 """
 _APPLIED_INPUTS = re.compile(r'^bunraku_inputs_total\{outcome="(?:taken|reach)"\} (\S+)$', re.MULTILINE)
 
