@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/v1 services/web/vite.config.ts services/web/vite.additional.ts services/web/vite.embed.config.ts services/web/vite.reference.config.ts proto/prior.json proto/constants.json -type f 2>/dev/null)
 
-.PHONY: simulate package pictures test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
+.PHONY: demo-data simulate package pictures test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    install everything, start the server and open the demo   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -100,6 +100,10 @@ package: setup
 
 vectors: .setup/python
 	$(BIN)/python -m tests.vectors
+
+# make the demo's motion, music, camera and lights again, after a change of the dance or of the codec
+demo-data: .setup/python
+	$(BIN)/python -m bunraku.demo.build
 
 # train the codec's prior on a folder of clips, about ten minutes
 prior: .setup/python
