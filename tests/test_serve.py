@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import contextlib
 import gc
+import gzip
 import re
 import resource
 import socket
@@ -128,6 +129,7 @@ async def test_page_is_revalidated_and_its_assets_are_immutable(
     page = tmp_path / "page"
     (page / "assets").mkdir(parents=True)
     (page / "index.html").write_text("<!doctype html><title>Bunraku</title>" + " " * 2000)
+    (page / "index.html.gz").write_bytes(gzip.compress((page / "index.html").read_bytes()))
     (page / "assets" / "index-abc.js").write_text("export {};" * 500)
     monkeypatch.setattr(serve, "PAGE_FOLDER", page)
     with run_server(tmp_path / "data") as url:

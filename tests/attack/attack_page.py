@@ -60,15 +60,15 @@ async def cacheable_responses(target: Target, report: Report) -> None:
 
 @attack(1, "others' overlay gap p99 <= 1.3x calm")
 async def compressed_page_files(target: Target, report: Report) -> None:
-    """Request the scripts of the page with compression, without a token, on eight connections."""
+    """Request the scripts of the page with compression, without a token, on fifty connections of ten addresses."""
     paths = [*(await find_page_files(target)), "/v1/openapi.json", "/"]
 
-    async def run(address: int) -> None:
-        until, number = time.monotonic() + target.seconds, address
-        async with open_socket(target, address=address) as opened:
+    async def run(number: int) -> None:
+        until = time.monotonic() + target.seconds
+        async with open_socket(target, address=1 + number % 10) as opened:
             while time.monotonic() < until and not opened.is_closed:
                 await opened.send(request(target, "GET", paths[number % len(paths)], "Accept-Encoding: gzip"))
                 report.count(await opened.describe_reaction())
                 number += 1
 
-    await asyncio.gather(*(run(address) for address in range(1, 9)))
+    await asyncio.gather(*(run(number) for number in range(50)))

@@ -76,7 +76,8 @@ def test_wheel_serves_page_and_demo_in_an_empty_environment(
     page = httpx2.get(f"{address}/").text
     scripts = re.findall(r'src="(/assets/[^"]+\.js)"', page)
     assert scripts
-    assert httpx2.get(address + scripts[0]).status_code == 200
+    script = httpx2.get(address + scripts[0], headers={"Accept-Encoding": "br"})
+    assert (script.status_code, script.headers["content-encoding"]) == (200, "br")
     assert httpx2.get(f"{address}/embed/bunraku-stage.js").status_code == 200
     motions = json.loads(
         run(installed / "bunraku", "list", "--server", address, "--json", cwd=tmp_path, env=environment)

@@ -1,0 +1,93 @@
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import httpx2
+import pytest
+
+from bunraku.page_files import accepted_encodings, create_page_app
+
+SCRIPT = b"export const answer = 42;" * 100
+
+
+@pytest.fixture
+def page(tmp_path: Path) -> Path:
+    """A page with a compressed script, and a picture that is not compressed."""
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "index.html").write_text("<!doctype html>")
+    script = tmp_path / "assets" / "index-abc.js"
+    script.write_bytes(SCRIPT)
+    Path(f"{script}.gz").write_bytes(gzip.compress(SCRIPT))
+    # no real Brotli: the server sends what it finds
+    Path(f"{script}.br").write_bytes(b"brotli")
+    (tmp_path / "assets" / "seal.png").write_bytes(b"\x89PNG")
+    return tmp_path
+
+
+def open_client(page: Path) -> httpx2.AsyncClient:
+    return httpx2.AsyncClient(transport=httpx2.ASGITransport(create_page_app(page)), base_url="http://page")
+
+
+@pytest.mark.parametrize(
+    ("header", "encoding", "body"),
+    [
+        ("", None, SCRIPT),
+        ("identity", None, SCRIPT),
+        ("gzip, deflate", "gzip", gzip.compress(SCRIPT)),
+        ("gzip, deflate, br, zstd", "br", b"brotli"),
+        ("br;q=0, GZIP;q=0.1", "gzip", gzip.compress(SCRIPT)),
+        ("br; q=0.000, gzip;q=0", None, SCRIPT),
+    ],
+)
+async def test_script_is_sent_in_the_best_accepted_encoding(
+    page: Path, header: str, encoding: str | None, body: bytes
+) -> None:
+    async with (
+        open_client(page) as client,
+        client.stream("GET", "/assets/index-abc.js", headers={"Accept-Encoding": header}) as response,
+    ):
+        raw = b"".join([chunk async for chunk in response.aiter_raw()])
+    assert response.status_code == 200
+    assert response.headers.get("content-encoding") == encoding
+    assert response.headers["vary"] == "Accept-Encoding"
+    assert response.headers["content-type"].startswith("text/javascript")
+    assert len(raw) == int(response.headers["content-length"])
+    # the time in the header of a gzip file differs
+    assert (gzip.decompress(raw) if encoding == "gzip" else raw) == (SCRIPT if encoding == "gzip" else body)
+
+
+async def test_each_encoding_is_revalidated_by_its_own_tag(page: Path) -> None:
+    async with open_client(page) as client:
+        tags = {}
+        for header in ("identity", "gzip"):
+            first = await client.get("/assets/index-abc.js", headers={"Accept-Encoding": header})
+            tags[header] = first.headers["etag"]
+            again = await client.get(
+                "/assets/index-abc.js", headers={"Accept-Encoding": header, "If-None-Match": tags[header]}
+            )
+            assert again.status_code == 304
+            assert again.headers["vary"] == "Accept-Encoding"
+            assert "immutable" in again.headers["cache-control"]
+    assert tags["gzip"] != tags["identity"]
+
+
+async def test_files_without_a_copy_are_sent_as_they_are(page: Path) -> None:
+    async with open_client(page) as client:
+        for path in ("/", "/assets/seal.png"):
+            response = await client.get(path, headers={"Accept-Encoding": "gzip, br"})
+            assert response.status_code == 200
+            assert "content-encoding" not in response.headers
+
+
+async def test_page_that_is_not_built_says_what_to_do(tmp_path: Path) -> None:
+    async with open_client(tmp_path) as client:
+        response = await client.get("/")
+    assert response.status_code == 503
+    assert "make setup" in response.text
+
+
+def test_unknown_encodings_are_ignored() -> None:
+    assert accepted_encodings("zstd, *;q=0.5, compress") == []
+    assert accepted_encodings("gzip;q=1.0,br;q=0.8") == ["br", "gzip"]
+    assert accepted_encodings(",;,;q=,gzip;q") == ["gzip"]
