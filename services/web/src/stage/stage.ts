@@ -366,6 +366,8 @@ export class Stage {
   /** Only the lacquer of the night look reflects, and only in a quality that allows it. */
   #applyQuality({ reflection, shadows, simpleMaterials } = this.#frameRenderer.quality): void {
     this.#lights.castsShadows = shadows;
+    // Simple materials need no environment; a look that was chosen meanwhile has made none.
+    if (!simpleMaterials && this.scene.environment === null) this.#updateEnvironment();
     this.#performerGroup.setQuality(this.#look.dark && reflection, simpleMaterials);
   }
 

@@ -43,14 +43,14 @@ export class FrameRenderer {
     return this.#fence.isReady;
   }
 
-  /** Draw a frame. Return whether the quality was reduced; only a measured frame can reduce it. */
+  /** Draw a frame. Return whether the quality has changed; only a measured frame can change it. */
   draw(scene: Scene, camera: PerspectiveCamera, isMeasured: boolean): boolean {
     this.#applySize();
     this.renderer.render(scene, camera);
     this.#fence.insert();
-    const isReduced = isMeasured && !this.#isTakingPicture && this.#quality.addFrameTime(this.#sinceDrawnS);
+    const hasChanged = isMeasured && !this.#isTakingPicture && this.#quality.addFrameTime(this.#sinceDrawnS);
     this.#sinceDrawnS = 0;
-    return isReduced;
+    return hasChanged;
   }
 
   /** Render the scene to a PNG in a resolution of at least twice the canvas. */
