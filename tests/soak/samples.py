@@ -6,8 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-WARM_UP_S = 300.0
-"""Time after the start of a process whose samples do not count."""
+WARM_UP_S = 1_020.0
+"""Time after the start of a process whose samples do not count.
+
+With a kill every 5 minutes, the other replica of a service is killed 15 minutes after this one has started, and its
+clients come over: the memory for twice the clients is part of the warm-up.
+"""
 MIN_TREND_S = 600.0
 """Shortest time of samples from which a trend is computed."""
 
