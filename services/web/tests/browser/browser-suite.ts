@@ -68,7 +68,7 @@ export function describeInBrowser(
         getShared<string>(`/browser?${options}`),
       ]);
       [server, browser] = [shared, await connectToChromium(endpoint)];
-      // The first suite of a run waits until the demo is encoded.
+      // The first suite of a run waits until server and browser have started.
     }, 4 * PAGE_TIMEOUT_MS);
     afterAll(() => browser?.close(), PAGE_TIMEOUT_MS);
 

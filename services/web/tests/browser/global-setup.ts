@@ -25,8 +25,6 @@ export default async function setup(project: TestProject): Promise<() => Promise
   });
   await new Promise<void>((done) => endpoint.listen(0, "127.0.0.1", done));
   project.provide("sharedResources", `http://127.0.0.1:${(endpoint.address() as AddressInfo).port}`);
-  // Encode the demo while other tests run. A failure is reported to the files that need it.
-  resources.demoData().catch(() => undefined);
   return async () => {
     endpoint.closeAllConnections();
     endpoint.close();

@@ -21,23 +21,12 @@ export interface RunningServer {
 }
 
 /** Start a server with a temporary data folder and resolve once it accepts requests. */
-export async function startServer(options: ServerOptions = {}): Promise<RunningServer> {
+export async function startServer({
+  demo = false,
+  secret = "",
+  origins = "",
+}: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
-  const server = await runServer(data, options);
-  return {
-    url: server.url,
-    async stop() {
-      await server.stop();
-      rmSync(data, { recursive: true, force: true });
-    },
-  };
-}
-
-/** Run a server that stores its data in `data`. */
-export async function runServer(
-  data: string,
-  { demo = false, secret = "", origins = "" }: ServerOptions,
-): Promise<RunningServer> {
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
   const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
     stdio: ["ignore", "pipe", "inherit"],
@@ -58,6 +47,7 @@ export async function runServer(
     async stop() {
       server.kill("SIGINT");
       await exited;
+      rmSync(data, { recursive: true, force: true });
     },
   };
 }

@@ -1,10 +1,7 @@
 /** Servers, browsers and a foreign site that the test files of a run share. Each starts when a file first needs it. */
-import { cpSync, mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { join } from "node:path";
 import { chromiumPath, launchSharedChromium } from "./chromium";
 import { type ForeignSite, startForeignSite } from "./foreign-site";
-import { makeToken, runServer, type ServerOptions } from "./server";
+import { makeToken, type ServerOptions, startServer } from "./server";
 
 /** `open` has the demo and no access control, `guarded` has the demo and a secret, `empty` has neither. */
 export type ServerKind = "open" | "guarded" | "empty";
@@ -23,7 +20,6 @@ export interface SharedServer {
 const SECRET = "the secret of a server that browser tests share";
 
 export class SharedResources {
-  readonly #folder = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
   readonly #started = new Map<string, Promise<unknown>>();
   readonly #stops: (() => unknown)[] = [];
 
@@ -41,20 +37,10 @@ export class SharedResources {
     });
   }
 
-  /** Return a data folder with the encoded demo, which takes as long to encode as several servers to start. */
-  demoData(): Promise<string> {
-    return this.#once("demo data", async () => {
-      const data = join(this.#folder, "demo");
-      await (await runServer(data, { demo: true })).stop();
-      return data;
-    });
-  }
-
-  /** Stop everything and remove its data. */
+  /** Stop everything. */
   async stop(): Promise<void> {
     await Promise.allSettled(this.#started.values());
     await Promise.all(this.#stops.map((stop) => stop()));
-    rmSync(this.#folder, { recursive: true, force: true });
   }
 
   #once<T>(name: string, start: () => Promise<T>): Promise<T> {
@@ -69,14 +55,12 @@ export class SharedResources {
       this.#stops.push(() => started.stop());
       return started;
     });
-    const data = join(this.#folder, kind);
-    if (kind !== "empty") cpSync(await this.demoData(), data, { recursive: true });
     const options: Record<ServerKind, ServerOptions> = {
       empty: {},
       open: { demo: true, origins: site.origin },
       guarded: { demo: true, origins: `${site.origin},null`, secret: SECRET },
     };
-    const server = await runServer(data, options[kind]);
+    const server = await startServer(options[kind]);
     this.#stops.push(() => server.stop());
     const tokens =
       kind === "guarded" ? { admin: makeToken(SECRET, "admin"), control: makeToken(SECRET, "control") } : null;
