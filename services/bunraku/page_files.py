@@ -36,7 +36,7 @@ IMMUTABLE_PREFIXES = ("assets/", "embed/parts/")
 CROSS_ORIGIN_PREFIX = "embed/"
 """Folder of the scripts that pages of every site may load. The scripts are public; their API requests are not."""
 ENCODINGS = {"br": ".br", "gzip": ".gz"}
-"""Content encodings, the best one first, and the suffixes of the copies that `services/web/compress-page.ts` makes."""
+"""Content encodings, the best one first, and the suffixes of the copies that `services/web/compress-page.mjs` makes."""
 
 
 class PageFiles(StaticFiles):

@@ -1,6 +1,6 @@
 /**
  * Writes a copy of each text file of the built page with Brotli (`.br`) and one with gzip (`.gz`), so that the server
- * compresses nothing: `node compress-page.ts FOLDER`.
+ * compresses nothing: `node compress-page.mjs FOLDER`.
  */
 import { readdirSync, readFileSync, statSync, writeFileSync } from "node:fs";
 import { extname, join } from "node:path";
