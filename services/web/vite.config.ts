@@ -45,7 +45,7 @@ export default defineConfig({
     expect: { poll: { timeout: TEST_TIMEOUT_MS } },
     environment: "node",
     maxWorkers: 2,
-    reporters: ["default", "./tests/slowest-tests.ts"],
+    reporters: ["default", "./tests/run-summary.ts"],
     projects: [
       {
         extends: true,
