@@ -42,12 +42,11 @@ from bunraku.page_files import create_page_app, reference_response
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.housekeeping import Housekeeping
-from bunraku.runtime.input_scheduler import InputScheduler
+from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.open_connections import OpenConnections
 from bunraku.runtime.readiness import Dependency, Readiness, install_health_routes
 from bunraku.runtime.settings import Settings
 from bunraku.session import limb_solver
-from bunraku.websocket.connection import TURN_US
 from bunraku.websocket.handoff import HandoffProtocol
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES
 

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from bunraku.websocket.connection import FRAMES_PER_TURN, TURN_US, FrameLimit, WebSocketConnection
+from bunraku.runtime.input_scheduler import TURN_US
+from bunraku.websocket.connection import FRAMES_PER_TURN, FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import Opcode
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from tests.raw_client import client_frame

@@ -17,9 +17,9 @@ from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from bunraku.runtime.input_scheduler import InputScheduler
+from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.websocket import handoff
-from bunraku.websocket.connection import TURN_US, WebSocketConnection
+from bunraku.websocket.connection import WebSocketConnection
 from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.handoff import HandoffProtocol, detach, reject
 from bunraku.websocket.subprotocol import CloseConnection

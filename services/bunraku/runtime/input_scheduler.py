@@ -10,6 +10,9 @@ from typing import Protocol
 
 from bunraku.runtime.clock import clock
 
+TURN_US = 1_000
+"""Time for frames of clients in each iteration of the event loop, microseconds."""
+
 _log = logging.getLogger(__name__)
 
 

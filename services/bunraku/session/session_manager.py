@@ -21,6 +21,7 @@ from bunraku.playout import timeline
 from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
 from bunraku.session.counters import SessionCounters
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRecord, SessionRegistry
@@ -48,6 +49,7 @@ class SessionManager:
 
     def __init__(self, context: ServiceContext, timing: ReplicaTiming = DEFAULT_TIMING) -> None:
         self._context = context
+        self.input_scheduler = InputScheduler(TURN_US)
         self._registry = SessionRegistry(context.key_values, timing)
         self._endpoints: dict[str, StageEndpoint] = {}
         # sessions that this replica creates or claims now, with the subject for which one is created

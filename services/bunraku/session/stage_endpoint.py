@@ -23,11 +23,13 @@ from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US
 from bunraku.playout.timeline import position_at
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.problem import ProblemError
+from bunraku.session.puppeteer_input import PuppeteerInput
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import Stage, load_bend_tables
-from bunraku.wire.messages import TimelineState, unpack
+from bunraku.wire.messages import TimelineState
 
 PUPPETEER_HEARTBEAT_S = 2.0
 """Interval between the heartbeats that a replica sends for a puppeteer."""
@@ -43,6 +45,9 @@ _log = logging.getLogger(__name__)
 
 class StageOwner(Protocol):
     """Manager of the stages of a replica."""
+
+    input_scheduler: InputScheduler
+    """Turns of the puppeteers of all stages."""
 
     async def load_motion(self, motion: str) -> StoredMotion:
         """Return a motion; raises `ProblemError`."""
@@ -69,6 +74,7 @@ class StageEndpoint:
         self._edit_lock = asyncio.Lock()
         self._owner = owner
         self._subject = f"session.{stage.id}"
+        self._inputs: dict[str, PuppeteerInput] = {}
         self._join_rate = KeyedTokenBuckets(JOINS_PER_S, JOIN_BURST)
         bus = context.bus
         self._subscriptions: list[Subscription] = [
@@ -158,20 +164,22 @@ class StageEndpoint:
             )
         except SessionFull as error:
             raise ProblemError(503, "Full", str(error)) from None
+        self._inputs[puppeteer_id] = PuppeteerInput(puppeteer, self.stage, self._owner.input_scheduler)
         return {"colour": puppeteer.colour}
 
     def _receive(self, message: bytes) -> None:
         puppeteer_id, packed = msgpack.unpackb(message)[:2]
         puppeteer = self.stage.puppeteers.get(puppeteer_id)
         if puppeteer is None:
+            self._inputs.pop(puppeteer_id, None)
             if packed is not None:
                 self._context.bus.publish(f"{self._subject}.told.{puppeteer_id}", b"")
             return
         puppeteer.last_heard_us = self._clock()
+        if packed != b"" and (puppeteer_input := self._inputs.get(puppeteer_id)) is not None:
+            puppeteer_input.add(packed)
         if packed is None:
-            self.stage.leave(puppeteer)
-        elif packed:
-            self.stage.receive(puppeteer, unpack(packed))
+            self._inputs.pop(puppeteer_id, None)
 
     async def _expire_participants(self) -> None:
         """Remove the puppeteers and viewers whose replica has died, until cancelled."""
@@ -187,6 +195,7 @@ class StageEndpoint:
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:
                     puppeteer.send(b"")
                     self.stage.leave(puppeteer)
+                    self._inputs.pop(puppeteer.id, None)
 
 
 def session_json(stage: Stage, now: int) -> dict[str, Any]:

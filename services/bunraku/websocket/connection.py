@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol, cast
 
 from bunraku.runtime.client_network import peer_network
 from bunraku.runtime.clock import clock
-from bunraku.runtime.input_scheduler import InputScheduler
+from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.runtime.transport import LingeringClose, WriteDeadline, set_send_buffer
 from bunraku.websocket.frame import (
@@ -39,8 +39,6 @@ SEND_BUFFER_BYTES = 32 << 10
 
 FRAMES_PER_TURN = 16
 """Frames of one connection that are handled before those of other connections."""
-TURN_US = 1_000
-"""Time for frames of clients in each iteration of the event loop, microseconds."""
 
 
 class FrameLimit(NamedTuple):
