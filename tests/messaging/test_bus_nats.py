@@ -144,6 +144,29 @@ async def test_messages_beyond_the_send_buffer_are_dropped(server: ServerProcess
         # the bus closes while the server is suspended
 
 
+async def test_messages_of_one_iteration_are_sent_together(
+    server: ServerProcess, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    writes: list[bytes] = []
+    write = asyncio.selector_events._SelectorSocketTransport.write  # type: ignore[attr-defined]
+
+    def record(transport: asyncio.Transport, data: bytes) -> None:
+        writes.append(data)
+        write(transport, data)
+
+    async with connect_buses(nats_url_of(server)) as (bus,):
+        recorder = MessageRecorder()
+        bus.subscribe("a", recorder)
+        await flush_buses(bus)
+        monkeypatch.setattr(asyncio.selector_events._SelectorSocketTransport, "write", record)  # type: ignore[attr-defined]
+        messages = [b"%03d" % number for number in range(100)]
+        for message in messages:
+            bus.publish("a", message)
+        assert not any(b"PUB" in data for data in writes)
+        assert await recorder.wait_for(messages[-1]) == messages
+        assert sum(b"PUB" in data for data in writes) == 1
+
+
 async def test_burst_arrives_in_order_with_excess_dropped(server: ServerProcess) -> None:
     async with connect_buses(nats_url_of(server), nats_url_of(server)) as (one, two):
         recorder = MessageRecorder()

@@ -1,6 +1,7 @@
 """One connection to a NATS server (https://docs.nats.io/reference/reference-protocols/nats-protocol).
 
-Implements the part of NATS core that the bus needs. Writes are sent at once; messages are delivered in order as they
+Implements the part of NATS core that the bus needs. The messages of one iteration of the event loop are sent together,
+since each write is a record of TLS, which costs both ends more than a message; messages are delivered in order as they
 are read. A connection is encrypted if the address or the server asks for it, and then never falls back to plain text.
 """
 
@@ -25,6 +26,8 @@ MAX_MISSED_HEARTBEATS = 3
 """Number of unanswered PINGs after which the connection is closed."""
 MAX_UNSENT_BYTES = 1 << 20
 """Maximum size of the send buffer, in bytes; beyond it messages are dropped."""
+MAX_QUEUED_BYTES = 1 << 14
+"""Size of the commands that are sent before the iteration of the event loop ends: one record of TLS."""
 MAX_LINE_BYTES = 1 << 16
 """Maximum length of a control line of the protocol."""
 
@@ -67,6 +70,8 @@ class NatsConnection(asyncio.Protocol):
         self._heartbeat_timer: asyncio.TimerHandle | None = None
         self._missed_heartbeats = 0
         self._receive_buffer = bytearray()
+        self._send_queue: list[bytes] = []
+        self._queued_bytes = 0
         self._close_reason = "the server closed the connection"
         self.max_payload = 0
         self.receive_count = 0
@@ -155,8 +160,20 @@ class NatsConnection(asyncio.Protocol):
         """Send a complete command; return False, with nothing sent, if the send buffer is full."""
         if self._transport.is_closing() or self.unsent_bytes > MAX_UNSENT_BYTES:
             return False
-        self._transport.write(command)
+        if not self._send_queue:
+            asyncio.get_running_loop().call_soon(self._flush)
+        self._send_queue.append(command)
+        self._queued_bytes += len(command)
+        if self._queued_bytes >= MAX_QUEUED_BYTES:
+            self._flush()
         return True
+
+    def _flush(self) -> None:
+        """Send the queued commands."""
+        if self._send_queue and not self._transport.is_closing():
+            self._transport.write(b"".join(self._send_queue))
+        self._send_queue.clear()
+        self._queued_bytes = 0
 
     def publish(self, subject: str, data: bytes, reply: str = "", headers: Mapping[str, str] | None = None) -> bool:
         """Send a message of at most `max_payload` bytes; return False if the send buffer is full."""
@@ -179,12 +196,13 @@ class NatsConnection(asyncio.Protocol):
     @property
     def unsent_bytes(self) -> int:
         """Size of the send buffer; with TLS also of its encrypted part."""
-        size = self._transport.get_write_buffer_size()
+        size = self._queued_bytes + self._transport.get_write_buffer_size()
         return size if self._transport is self._tcp_transport else size + self._tcp_transport.get_write_buffer_size()
 
     async def close(self) -> None:
         """Close the connection; unsent data is sent if the server accepts it within `CONNECT_TIMEOUT_S`."""
         self._close_reason = "closed"
+        self._flush()
         self._transport.close()
         await asyncio.wait((self.closed,), timeout=CONNECT_TIMEOUT_S)
         self.abort("closed")
