@@ -28,8 +28,14 @@ class Terminal(io.StringIO):
         return True
 
 
+def read_log(stream: io.StringIO) -> str:
+    for handler in logging.getLogger().handlers:
+        handler.flush()
+    return stream.getvalue()
+
+
 def parse_log_lines(stream: io.StringIO) -> list[dict[str, Any]]:
-    return [json.loads(line) for line in stream.getvalue().splitlines()]
+    return [json.loads(line) for line in read_log(stream).splitlines()]
 
 
 def test_json_line_has_process_and_request_fields() -> None:
@@ -64,7 +70,7 @@ def test_json_traceback_omits_local_variables() -> None:
     logging.getLogger("bunraku.session").warning("below the level")
     (line,) = parse_log_lines(output)
     assert "KeyError: 'missing'" in line["exception"]
-    assert secret not in output.getvalue()
+    assert secret not in read_log(output)
 
 
 @pytest.mark.parametrize(("style", "level", "count"), [("plain", "", 1), ("json", "", 2), ("json", "debug", 3)])
@@ -75,7 +81,7 @@ def test_other_libraries_log_from_warning(style: log.LogStyle, level: log.LogLev
         for severity in (logging.DEBUG, logging.INFO):
             logging.getLogger(name).log(severity, "a message")
     logging.getLogger("bunraku.messaging").warning("a message")
-    assert output.getvalue().count("a message") == count
+    assert read_log(output).count("a message") == count
 
 
 def test_plain_line_is_coloured_only_on_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,7 +89,7 @@ def test_plain_line_is_coloured_only_on_a_terminal(monkeypatch: pytest.MonkeyPat
         log.configure_logging("plain", "", "all", stream)
         with request_id.bind("one-12345"):
             logging.getLogger("bunraku.messaging").warning("the bus is %s", "down", extra={"seconds": 2})
-        return stream.getvalue()
+        return read_log(stream)
 
     monkeypatch.delenv("NO_COLOR", raising=False)
     plain = log_to(io.StringIO())
@@ -113,7 +119,7 @@ def test_plain_line_escapes_texts_of_clients() -> None:
         raise ValueError(hostile)
     except ValueError:
         logging.getLogger("bunraku.http").exception("refused %s", hostile, extra={"path": hostile})
-    text = output.getvalue()
+    text = read_log(output)
     assert "\x1b" not in text
     assert "\u202e" not in text
     head, *traceback = text.splitlines()

@@ -16,6 +16,7 @@ from structlog.typing import EventDict, Processor
 
 from bunraku.runtime import request_id
 from bunraku.runtime.display_text import escape_text
+from bunraku.runtime.log_handler import BackgroundStreamHandler
 
 LogStyle = Literal["plain", "json"]
 LogLevel = Literal["", "debug", "info", "warning", "error"]
@@ -29,20 +30,17 @@ def configure_logging(style: LogStyle, level: LogLevel, service: str, stream: Te
     An empty `level` is INFO for JSON and WARNING for plain lines. `service` names the process in JSON.
     """
     output = sys.stderr if stream is None else stream
-    handler = _StreamHandler(output)
+    handler = BackgroundStreamHandler(output)
     handler.setFormatter(_create_formatter(style, service, _supports_colour(output)))
     root = logging.getLogger()
-    for previous in [each for each in root.handlers if isinstance(each, _StreamHandler)]:
+    for previous in [each for each in root.handlers if isinstance(each, BackgroundStreamHandler)]:
         root.removeHandler(previous)
+        previous.close()
     root.addHandler(handler)
     root.setLevel(logging.WARNING)
     effective_level = level or ("info" if style == "json" else "warning")
     logging.getLogger(ROOT_LOGGER).setLevel(effective_level.upper())
     logging.captureWarnings(True)
-
-
-class _StreamHandler(logging.StreamHandler[TextIO]):
-    """The handler that `configure_logging` installs and replaces."""
 
 
 def _create_formatter(style: LogStyle, service: str, use_colour: bool) -> logging.Formatter:
