@@ -19,6 +19,8 @@ from tests.attack.registry import Report, Target, attack
 
 HEADER_TIMEOUT_S = 12.0
 """The server's time limit for request headers, with a margin."""
+CONNECTIONS_BEYOND_LIMITS = 2_000
+"""More connections than two replicas together permit an address."""
 REFUSED = "400 or closed within the header timeout"
 
 
@@ -310,7 +312,7 @@ async def endless_chunk_framing(target: Target, report: Report) -> None:
 @attack(3, "429 for connections beyond the limit")
 async def forged_forwarded_for(target: Target, report: Report) -> None:
     """Open sockets with a different X-Forwarded-For each, to evade the limit per address."""
-    for number in range(700):
+    for number in range(CONNECTIONS_BEYOND_LIMITS):
         forged = f"X-Forwarded-For: 203.0.{number % 250}.{number // 250 + 1}"
         async with open_socket(target, address=200) as opened:
             await opened.send(handshake(target, target.stream, None, forged))
@@ -318,7 +320,7 @@ async def forged_forwarded_for(target: Target, report: Report) -> None:
         report.count(reaction)
         if reaction == "429":
             return
-    report.require(False, "700 connections with forged addresses were not limited")
+    report.require(False, f"{CONNECTIONS_BEYOND_LIMITS} connections with forged addresses were not limited")
 
 
 @attack(3, "others' overlay gap p99 <= 1.3x calm; 429 at the gateway", seconds=0.0)

@@ -1,7 +1,7 @@
 /** Mouse and touch on the stage: dragging a handle pulls its limb, dragging anything else turns the view. */
 import { Vector3 } from "three";
 import type { Stage } from "../stage/stage";
-import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
+import { limbWithinPerformer, performerOfLimb } from "../wire/limbs";
 import type { LimbController } from "./limb-controller";
 import { OneEuro, smoothingSettings } from "./one-euro";
 
@@ -76,12 +76,9 @@ export function createPointerInput(
   const limbNear = (x: number, y: number): number | null => {
     let nearestLimb: number | null = null;
     let minDistance = GRAB_RADIUS_PX;
-    stage.performers.forEach(({ group }, k) => {
-      for (let limb = limbNumber(k, 0); group.visible && limb < limbNumber(k + 1, 0); limb++) {
-        const at = stage.toScreen(handleAt(limb));
-        const distance = Math.hypot(at.x - x, at.y - y);
-        if (distance < minDistance) [nearestLimb, minDistance] = [limb, distance];
-      }
+    stage.drawnHandles.forEach((at, limb) => {
+      const distance = at && stage.performers[performerOfLimb(limb)] ? Math.hypot(at.x - x, at.y - y) : Infinity;
+      if (distance < minDistance) [nearestLimb, minDistance] = [limb, distance];
     });
     return nearestLimb;
   };

@@ -9,7 +9,7 @@ import { AudienceCamera, type Framing } from "./camera/audience-camera";
 import { CameraRecorder } from "./camera/camera-recorder";
 import { FollowRig } from "./camera/follow-rig";
 import type { ScreenBox, WorldExtent } from "./camera/screen-box";
-import { ScreenProjection } from "./camera/screen-projection";
+import { type ScreenPosition, ScreenProjection } from "./camera/screen-projection";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
 import { FrameRenderer } from "./rendering/frame-renderer";
@@ -67,6 +67,7 @@ export class Stage {
   #framing: Framing = "desktop";
   readonly #frameRenderer: FrameRenderer;
   #emptyS = 0;
+  #drawnHandles: readonly (ScreenPosition | null)[] = [];
   /** Progress of the first frame with a performer. */
   #firstFrame: "pending" | "submitted" | "complete" = "pending";
 
@@ -100,6 +101,14 @@ export class Stage {
   /** The first performer: the puppet, or an avatar in its place. */
   get puppet(): Performer | null {
     return this.performers[0] ?? null;
+  }
+
+  /**
+   * Positions of the handles in the last drawn frame by limb number, null for those of an invisible performer. A slow
+   * machine draws few frames: what people point at is not where the handles have moved since.
+   */
+  get drawnHandles(): readonly (ScreenPosition | null)[] {
+    return this.#drawnHandles;
   }
 
   /** Disables easing and swing. */
@@ -226,6 +235,7 @@ export class Stage {
     if (hasPose && this.#firstFrame === "pending") this.#firstFrame = "submitted";
     if (this.#firstFrame !== "submitted") this.#addScenery();
     if (this.#frameRenderer.draw(this.scene, audience.camera, hasPose)) this.#applyQuality();
+    this.#drawnHandles = this.#performerGroup.handles.map((at) => at && this.toScreen(at));
   }
 
   /** Release all graphics resources; the stage cannot draw afterwards. */
@@ -254,7 +264,7 @@ export class Stage {
   }
 
   /** Return the position on the screen, in CSS pixels, of a world position. */
-  toScreen(at: Vector3): { x: number; y: number } {
+  toScreen(at: Vector3): ScreenPosition {
     return this.#projection.toScreen(at);
   }
 

@@ -33,6 +33,8 @@ let claimed: number[];
 let performers: Puppet[];
 let smoothing: number;
 let depthInput: number;
+/** Handles of the last drawn frame; null if every frame is drawn. */
+let drawnHandles: ({ x: number; y: number } | null)[] | null;
 
 beforeEach(() => {
   [canvas, session, puppet, free, refused, claimed, smoothing, depthInput] = [
@@ -46,9 +48,21 @@ beforeEach(() => {
     0,
   ];
   performers = [puppet];
+  const toScreen = (at: Vector3) => ({ x: at.x * SCALE, y: -at.y * SCALE });
+  drawnHandles = null;
   const stage = {
     performers,
-    toScreen: (at: Vector3) => ({ x: at.x * SCALE, y: -at.y * SCALE }),
+    toScreen,
+    get drawnHandles() {
+      return (
+        drawnHandles ??
+        performers.flatMap((performer) =>
+          [0, 1, 2, 3].map((limb) =>
+            performer.group.visible ? toScreen(performer.handle(limb, new Vector3())) : null,
+          ),
+        )
+      );
+    },
     fromScreen: (x: number, y: number, through: Vector3) => new Vector3(x / SCALE, -y / SCALE, through.z),
     back: () => new Vector3(0, 0, 1),
     audience: { orbit: () => undefined },
@@ -114,6 +128,26 @@ test("the nearest visible handle of several performers is grabbed", () => {
   send("pointermove", at.x + 20, at.y, 16);
   expect(limbController.pullTarget(4 + LEFT_HAND)?.x).toBeCloseTo(ring().x + 1.1, 9);
   expect(limbController.pullTarget(LEFT_HAND)).toBe(null);
+});
+
+test("the handle under the pointer in the drawn picture is grabbed, although it has moved since", () => {
+  const drawn = { x: ring().x * SCALE, y: -ring().y * SCALE };
+  drawnHandles = [drawn, null, null, null];
+  puppet.group.position.x += 3;
+  puppet.group.updateMatrixWorld(true);
+  const moved = ring();
+  expect(Math.abs(moved.x * SCALE - drawn.x)).toBeGreaterThan(100);
+  send("pointerdown", drawn.x, drawn.y, 0);
+  expect(claimed).toEqual([LEFT_HAND]);
+  // the limb is pulled by the movement of the pointer, not to it
+  send("pointermove", drawn.x + 20, drawn.y, 16);
+  expect(pullTarget().distanceTo(moved.add(new Vector3(0.1, 0, 0)))).toBeLessThan(1e-9);
+});
+
+test("a drag beside all handles of the drawn picture turns the view", () => {
+  drawnHandles = [];
+  grab();
+  expect(claimed).toEqual([]);
 });
 
 test("a handle that cannot be claimed is refused", () => {

@@ -2,6 +2,12 @@
 import { type PerspectiveCamera, Plane, Raycaster, Vector2, Vector3 } from "three";
 import { projectBox, type ScreenBox, type WorldExtent } from "./screen-box";
 
+/** Position in the picture, in CSS pixels from the upper left corner. */
+export interface ScreenPosition {
+  x: number;
+  y: number;
+}
+
 export class ScreenProjection {
   width = 1;
   height = 1;
@@ -13,7 +19,7 @@ export class ScreenProjection {
   }
 
   /** Return the position in the picture of a world position. */
-  toScreen(position: Vector3): { x: number; y: number } {
+  toScreen(position: Vector3): ScreenPosition {
     const clip = position.clone().project(this.#camera);
     return { x: (clip.x * 0.5 + 0.5) * this.width, y: (0.5 - clip.y * 0.5) * this.height };
   }

@@ -1,6 +1,6 @@
 /** Performers on the stage: a puppet, or an avatar in its place, for each performer of the motion. */
-import { Group, type IUniform } from "three";
-import type { Figure, Pose } from "../../motion/skeleton";
+import { Group, type IUniform, Vector3 } from "three";
+import { type Figure, LIMBS, type Pose } from "../../motion/skeleton";
 import type { Performer } from "./performer";
 import { Puppet } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
@@ -31,6 +31,13 @@ export class PerformerGroup {
   /** Performers that have had a pose. */
   get visiblePerformers(): readonly Performer[] {
     return this.#performers.filter(({ group }) => group.visible);
+  }
+
+  /** World positions of the handles by limb number, null for those of an invisible performer. */
+  get handles(): (Vector3 | null)[] {
+    return this.#performers.flatMap((performer) =>
+      LIMBS.map((_, limb) => (performer.group.visible ? performer.handle(limb, new Vector3()) : null)),
+    );
   }
 
   /**
