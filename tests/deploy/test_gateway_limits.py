@@ -235,3 +235,18 @@ async def test_rejected_body_does_not_harm_other_requests(tmp_path: Path, monkey
             for _ in range(5):
                 assert (await http.post("/v1/nothing", content=bytes(200_000))).status_code == 404
                 assert (await http.post("/v1/solve", json={})).status_code in (400, 422)
+
+
+@pytest.mark.parametrize("accepted", ["", "Accept-Encoding: gzip\r\n", "Accept-Encoding: br\r\n"])
+async def test_gateway_asks_for_the_encoding_that_the_client_accepts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, accepted: str
+) -> None:
+    # otherwise a client without gzip makes it decompress each file of the page
+    async with run_recording_service() as (service, service_port):
+        with run_gateway(tmp_path, service_port, monkeypatch) as port:
+            request = f"GET / HTTP/1.1\r\nHost: a\r\n{accepted}Connection: close\r\n\r\n"
+            response = await send_and_read(port, request.encode())
+    assert b"content-length: 2" in response.lower()
+    (head,) = service.heads
+    sent = [line for line in head.decode().split("\r\n") if line.lower().startswith("accept-encoding")]
+    assert sent == ([accepted.strip()] if accepted else [])
