@@ -16,6 +16,7 @@ import hypothesis
 import pytest
 from httpx2._config import DEFAULT_TIMEOUT_CONFIG
 
+from bunraku.runtime.settings import Settings
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import COROUTINE_TIMEOUT_S, HANG_TIMEOUT_S
 
@@ -25,6 +26,10 @@ hypothesis.settings.load_profile("bunraku")
 
 # the default of 5 s suits interactive use, not a loaded machine
 DEFAULT_TIMEOUT_CONFIG.read = HANG_TIMEOUT_S
+
+# tests choose their settings, whatever the environment has
+for field in Settings.model_fields:
+    os.environ.pop(f"BUNRAKU_{field.upper()}", None)
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
