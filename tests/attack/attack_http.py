@@ -189,9 +189,13 @@ async def request_smuggling(target: Target, report: Report) -> None:
             report.count(str(first.status) if first else "closed without an answer")
             second = await opened.read_response(1.5) if first is not None else None
             status = first.status if first else 400
+            # a gateway removes a length beside chunks, and reports a broken body that it has begun to pass on
+            is_cleaned = target.is_behind_gateway and name in ("CL and TE", "TE and CL")
+            is_passed_on = target.is_behind_gateway and "chunk" in name
             # "two hosts" and the like may be answered, but the hidden request of an ambiguous length may not
-            report.require(status in (400, 413, 431, 501) or second is None, f"{name}: {status}, connection kept")
-            report.require(status < 500 or status == 501, f"{name}: {status}")
+            is_refused = status in (400, 413, 431, 501) or (status == 502 and is_passed_on)
+            report.require(is_refused or is_cleaned or second is None, f"{name}: {status}, connection kept")
+            report.require(status < 500 or is_refused, f"{name}: {status}")
 
 
 @attack(19, "no 5xx; the connection is answered or closed", quick=True)
@@ -258,7 +262,7 @@ async def unusual_requests(target: Target, report: Report) -> None:
             # the server waits for the body of some
             reaction = await opened.describe_reaction(2.0)
             report.count(reaction)
-            report.require(not reaction.startswith("5") or reaction == "501", f"{name}: {reaction}")
+            report.require(not reaction.startswith("5") or reaction in ("501", "505"), f"{name}: {reaction}")
 
 
 @attack(3, "others' overlay gap p99 <= 1.3x calm; bounded memory")

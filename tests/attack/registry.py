@@ -34,6 +34,11 @@ class Target:
     source: str = SOURCE_ADDRESSES
 
     @property
+    def is_behind_gateway(self) -> bool:
+        """True if a gateway parses the requests first."""
+        return not self.source
+
+    @property
     def stream(self) -> str:
         """Path of the stream of the controlled session."""
         return f"/v1/sessions/{self.session}/stream"
