@@ -87,7 +87,9 @@ simulate: .setup/python
 test-web: .setup/page
 	cd services/web && npm run --silent check && npm test --silent
 
-test: setup lint test-web test-python
+# two parts at a time: none of them keeps the processors busy all the time
+test: setup
+	@+$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint test-web test-python
 
 # build the wheel and the npm package in dist/ and test both in empty environments
 package: setup

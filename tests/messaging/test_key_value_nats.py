@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from bunraku.messaging import key_value_nats
+from bunraku.messaging import key_value_nats, key_value_watch_nats
 from bunraku.messaging.bus_nats import NatsBus
 from bunraku.messaging.key_value_nats import NatsKeyValueStore
 from bunraku.messaging.nats_connection import NatsMessage
@@ -117,6 +117,11 @@ async def synchronised_keys(store: NatsKeyValueStore) -> dict[str, bytes]:
                 await asyncio.sleep(0.02)
 
 
+async def synchronise_again_and_again(store: NatsKeyValueStore) -> None:
+    while True:
+        await store.synchronise()
+
+
 async def test_watch_misses_no_change_when_its_connection_is_cut(tmp_path: Path) -> None:
     with run_jetstream(tmp_path) as server:
         async with open_store(nats_url_of(server)) as (bus, store), open_store(nats_url_of(server)) as (_, other):
@@ -191,3 +196,18 @@ async def test_removed_keys_leave_nothing_for_ever(tmp_path: Path, monkeypatch: 
             info = json.loads(await bus.request("$JS.API.STREAM.INFO.KV_bunraku"))
             assert info["state"]["messages"] <= 3
             assert await synchronised_keys(store) == {"sessions.again": b"29"}
+
+
+async def test_copy_counts_as_incomplete_while_no_consumer_follows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the server's signs of life come later than this, so that each consumer is given up
+    monkeypatch.setattr(key_value_watch_nats, "MAX_MISSED_HEARTBEATS", 0.05)
+    monkeypatch.setattr(key_value_watch_nats, "RESTART_DELAY_S", 10 * HANG_TIMEOUT_S)
+    with run_jetstream(tmp_path) as server:
+        async with open_store(nats_url_of(server)) as (_, store):
+            await store.put("sessions.a", b"1")
+            await synchronised_keys(store)
+            async with asyncio.timeout(HANG_TIMEOUT_S):
+                with pytest.raises(BackendUnavailable, match="register"):
+                    await synchronise_again_and_again(store)

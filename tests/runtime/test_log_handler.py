@@ -10,8 +10,8 @@ from typing import IO
 
 import pytest
 
-from bunraku.runtime import log_handler
-from bunraku.runtime.log_handler import BackgroundStreamHandler
+from bunraku.runtime import log
+from bunraku.runtime.log import BackgroundStreamHandler
 from tests.time_limit import HANG_TIMEOUT_S
 
 LINE = "x" * 200
@@ -33,8 +33,8 @@ def test_lines_are_written_in_order() -> None:
 
 
 def test_reader_that_stops_delays_nobody_and_learns_what_was_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(log_handler, "MAX_WAITING_LINES", 100)
-    monkeypatch.setattr(log_handler, "FLUSH_TIMEOUT_S", 0.01)
+    monkeypatch.setattr(log, "MAX_WAITING_LINES", 100)
+    monkeypatch.setattr(log, "FLUSH_TIMEOUT_S", 0.01)
     read_end, write_end = os.pipe()
     handler = BackgroundStreamHandler(os.fdopen(write_end, "w"))
     logged = 4 * PIPE_BYTES // len(LINE)
@@ -49,7 +49,7 @@ def test_reader_that_stops_delays_nobody_and_learns_what_was_dropped(monkeypatch
 
     reading = threading.Thread(target=read, args=(os.fdopen(read_end),))
     reading.start()
-    monkeypatch.setattr(log_handler, "FLUSH_TIMEOUT_S", HANG_TIMEOUT_S)
+    monkeypatch.setattr(log, "FLUSH_TIMEOUT_S", HANG_TIMEOUT_S)
     handler.flush()
     handler.handle(make_record("after"))
     handler.close()

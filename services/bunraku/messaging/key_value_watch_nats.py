@@ -98,6 +98,8 @@ class NatsKeyValueWatch:
                         return
         finally:
             reconnection.unsubscribe()
+            # without a consumer nobody learns of changes, nor that the server has lost its data
+            consumer.stop()
             consumer.close()
 
 
