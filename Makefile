@@ -89,6 +89,7 @@ test-web: .setup/page
 
 # two parts at a time: none of them keeps the processors busy all the time
 test: setup
+	@echo "test: lint, test-web and test-python, two at a time; each is shown when it has ended, all within about ten minutes"
 	@+$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint test-web test-python
 
 # build the wheel and the npm package in dist/ and test both in empty environments
