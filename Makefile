@@ -87,10 +87,7 @@ simulate: .setup/python
 test-web: .setup/page
 	cd services/web && npm run --silent check && npm test --silent
 
-# two parts at a time: none of them keeps the processors busy all the time
-test: setup
-	@echo "test: lint, test-web and test-python, two at a time; each is shown when it has ended, all within about ten minutes"
-	@+$(MAKE) --no-print-directory --jobs=2 --output-sync=line lint test-web test-python
+test: setup lint test-web test-python
 
 # build the wheel and the npm package in dist/ and test both in empty environments
 package: setup
