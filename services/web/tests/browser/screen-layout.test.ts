@@ -15,6 +15,7 @@ const WINDOWS = [
   [568, 320],
   [1024, 600],
 ] as const;
+const LOW_WINDOW_PX = 500;
 
 describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
   test("tags of sixteen held limbs and toasts cover no face, bar or control", async () => {
@@ -34,16 +35,18 @@ describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
     for (const [width, height] of WINDOWS) {
       await page.setViewportSize({ width, height });
       await waitForDraw(page);
-      // Poll, because the new size takes some frames.
+      // Poll, because the new size takes some frames. In a low window the bars are at its top, with little room for tags.
+      const minTags = height < LOW_WINDOW_PX ? 1 : 5;
       await expect
         .poll(
           async () => {
             await reclaimLostLimbs(page);
-            return findCoveredElements(page);
+            const { tagCount, covered } = await findCoveredElements(page);
+            return tagCount < minTags ? [`only ${tagCount} tags`] : covered;
           },
           { message: `${width} x ${height}` },
         )
-        .toMatchObject({ shown: true, covered: [] });
+        .toEqual([]);
       await waitForToast(page, "Dancer", () => page.keyboard.press("KeyT"));
       // Add two permanent copies of the toast.
       await page.evaluate(() =>
@@ -151,8 +154,8 @@ function reclaimLostLimbs(page: Page): Promise<void> {
   });
 }
 
-/** Return whether tags are shown, and descriptions of the tags and toasts that cover something or leave the window. */
-function findCoveredElements(page: Page): Promise<{ shown: boolean; covered: string[] }> {
+/** Return the number of tags, and descriptions of the tags and toasts that cover something or leave the window. */
+function findCoveredElements(page: Page): Promise<{ tagCount: number; covered: string[] }> {
   return page.evaluate(() => {
     const { stage } = window.bunraku;
     const boxes = (selector: string) =>
@@ -185,7 +188,7 @@ function findCoveredElements(page: Page): Promise<{ shown: boolean; covered: str
     };
     check(tags, [...tags, ...toasts, ...faces, ...bars, ...parts]);
     check(toasts, [...toasts, ...faces]);
-    return { shown: tags.length > 4, covered: problems };
+    return { tagCount: tags.length, covered: problems };
   });
 }
 
