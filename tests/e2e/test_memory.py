@@ -6,10 +6,12 @@ Objects in a reference cycle would stay until a collection of all generations, w
 from __future__ import annotations
 
 import asyncio
+import functools
 import gc
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from websockets.exceptions import ConnectionClosed
@@ -36,18 +38,33 @@ OWNED_BY_CLIENTS = (
 
 
 @pytest.fixture
-def no_collections(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    # frozen objects, those of a server that is warmed up, would not be listed
-    monkeypatch.setattr(gc, "freeze", lambda: None)
+def living(monkeypatch: pytest.MonkeyPatch) -> Iterator[Counter[type]]:
+    """Count the living objects of `OWNED_BY_CLIENTS`, while no collection frees those that are in a cycle.
+
+    `gc.get_objects` would also return tuples that another thread is still building, which then fails there.
+    """
+    counts: Counter[type] = Counter()
+    for owned in OWNED_BY_CLIENTS:
+        monkeypatch.setattr(owned, "__init__", _counting(counts, owned.__init__))
+        monkeypatch.setattr(owned, "__del__", lambda self: counts.subtract((type(self),)), raising=False)
     gc.collect()
     gc.disable()
-    yield
+    yield counts
     gc.enable()
 
 
-@pytest.mark.usefixtures("no_collections")
-async def test_clients_that_left_leave_no_object_behind(tmp_path: Path, clip_file: Path) -> None:
-    before = count_objects()
+def _counting(counts: Counter[type], initialise: Callable[..., None]) -> Callable[..., None]:
+    """Return `initialise` so that it also counts its object."""
+
+    @functools.wraps(initialise)
+    def initialise_and_count(self: object, *arguments: Any, **options: Any) -> None:
+        counts[type(self)] += 1
+        initialise(self, *arguments, **options)
+
+    return initialise_and_count
+
+
+async def test_clients_that_left_leave_no_object_behind(tmp_path: Path, clip_file: Path, living: Counter[type]) -> None:
     with run_server(tmp_path / "data") as url:
         async with Client(url) as client:
             motion = (await client.upload(clip_file))["id"]
@@ -65,17 +82,12 @@ async def test_clients_that_left_leave_no_object_behind(tmp_path: Path, clip_fil
                 await message(refused)
                 with pytest.raises(ConnectionClosed):
                     await refused.recv()
-            assert count_objects()[Stage] > before[Stage]
+            assert living[Stage] == living[StageEndpoint] == 1
             await client._request("DELETE", f"/v1/sessions/{session}")
-            await wait_until_freed(before)
+            await wait_until_freed(living)
 
 
-async def wait_until_freed(before: Counter[type]) -> None:
+async def wait_until_freed(living: Counter[type]) -> None:
     async with asyncio.timeout(HANG_TIMEOUT_S):
-        while count_objects() - before:  # noqa: ASYNC110 - nothing announces that an object is freed
+        while +living:  # noqa: ASYNC110 - nothing announces that an object is freed
             await asyncio.sleep(0.1)
-
-
-def count_objects() -> Counter[type]:
-    """Return the number of living objects of each type of `OWNED_BY_CLIENTS`."""
-    return Counter(type(each) for each in gc.get_objects() if type(each) in OWNED_BY_CLIENTS)
