@@ -71,12 +71,7 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
     role: "img",
     "aria-label": translate("A wooden puppet dancing on a stage before a disc of gold leaf"),
   });
-  const frame = element(
-    "div",
-    { class: "frame", part: "frame", lang: translator.language, tabindex: -1 },
-    canvas,
-    element("div", { class: "vignette" }),
-  );
+  const frame = element("div", { class: "frame", part: "frame", lang: translator.language, tabindex: -1 }, canvas);
   root.append(frame);
   const nameTags = createNameTags(frame, actions.ask, { top: TAG_TOP_MARGIN_PX, translator });
   const notice = element("div", { class: "notice", part: "notice", role: "status", hidden: true });

@@ -3,24 +3,28 @@
  * reads no clock.
  */
 import { type IUniform, Scene, Vector3, type WebGLRenderer } from "three";
-import type { Figure, Pose } from "../motion/skeleton";
+import { type Figure, LIMBS, type Pose } from "../motion/skeleton";
 import type { LightState } from "../playout/light-state";
+import { limbNumber } from "../wire/limbs";
 import { AudienceCamera, type Framing } from "./camera/audience-camera";
 import { CameraRecorder } from "./camera/camera-recorder";
 import { FollowRig } from "./camera/follow-rig";
-import type { ScreenBox, WorldExtent } from "./camera/screen-box";
+import { type ScreenBox, unionOf, type WorldExtent } from "./camera/screen-box";
 import { type ScreenPosition, ScreenProjection } from "./camera/screen-projection";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
 import { FrameRenderer } from "./rendering/frame-renderer";
 import { type Graphics, openGraphics } from "./rendering/graphics";
-import { QUALITY_LEVELS } from "./rendering/quality";
+import { BEST_QUALITY, type Quality } from "./rendering/quality";
 import { applyLookToBackdrop, createBackdrop, createBackdropUniforms } from "./scenery/backdrop";
+import { BakedBackdrop } from "./scenery/baked-backdrop";
+import { createBakedUniforms } from "./scenery/baked-uniforms";
 import { createEnvironmentMap } from "./scenery/environment-map";
 import { createFloor, type Floor } from "./scenery/floor";
 import { createLights } from "./scenery/lighting";
 import { LOOKS, type Look, type Theme } from "./scenery/look";
 import { Scenery } from "./scenery/scenery";
+import { applyLookToVignette, createVignetteUniforms } from "./scenery/vignette";
 import { type StringState, Strings } from "./strings/strings";
 
 /** Limits of the pixel ratio: higher ones cost more than they show. */
@@ -32,6 +36,13 @@ const HEADROOM_SHARE = 0.2;
 /** Extents of a control bar and a face on the standard figure. */
 const BAR_EXTENT: WorldExtent = { across: 0.17, up: 0.07, down: 0.05 };
 const FACE_EXTENT: WorldExtent = { across: 0.1, up: 0.16, down: 0.14 };
+
+/** Joints that span a figure, and how far its clothes and hair reach beyond them on the standard figure. */
+const OUTER_JOINTS = [
+  "skullbase",
+  ...["l", "r"].flatMap((side) => [`${side}_elbow`, `${side}_wrist`, `${side}_knee`, `${side}_ankle`]),
+];
+const EDGE_EXTENT: WorldExtent = { across: 0.3, up: 0.3, down: 0.3 };
 
 /** Half the width that the lights cover for one performer, in metres. */
 const LIT_HALF_WIDTH_M = 1.2;
@@ -56,7 +67,11 @@ export class Stage {
   selectedPerformer: number | null = null;
   readonly #performerGroup: PerformerGroup;
   readonly #scenery = new Scenery();
-  readonly #backdrop = createBackdropUniforms();
+  readonly #backdropUniforms = createBackdropUniforms();
+  readonly #vignette = createVignetteUniforms();
+  readonly #baked = createBakedUniforms();
+  readonly #backdrop = createBackdrop(this.#backdropUniforms, this.#vignette, this.#baked);
+  readonly #bakedBackdrop = new BakedBackdrop(this.#backdropUniforms, this.#baked);
   readonly #floor: Floor;
   readonly #lights = createLights();
   readonly #floorHeight: IUniform<number> = { value: 0 };
@@ -66,6 +81,7 @@ export class Stage {
   #reducedMotion = false;
   #framing: Framing = "desktop";
   readonly #frameRenderer: FrameRenderer;
+  #appliedQuality: Quality | null = null;
   #emptyS = 0;
   #drawnHandles: readonly (ScreenPosition | null)[] = [];
   /** Progress of the first frame with a performer. */
@@ -75,14 +91,16 @@ export class Stage {
   constructor(canvas: HTMLCanvasElement, graphics: Graphics = openGraphics(canvas)) {
     this.#frameRenderer = new FrameRenderer(canvas, graphics);
     this.renderer = this.#frameRenderer.renderer;
-    const { simpleMaterials } = this.#frameRenderer.quality;
-    this.#floor = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, simpleMaterials);
-    this.#scenery.group.add(createBackdrop(this.#backdrop), this.#floor.mesh);
+    const surroundings = { backdrop: this.#backdropUniforms, vignette: this.#vignette, baked: this.#baked };
+    this.#floor = createFloor(surroundings, this.#scenery.group, this.rig.floorOffset);
+    this.#scenery.group.add(this.#backdrop.mesh, this.#floor.mesh);
     this.#performerGroup = new PerformerGroup(this.#floorHeight);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#performerGroup.group);
+    // They are updated before each frame, to see whether anything has moved.
+    this.scene.matrixWorldAutoUpdate = false;
     // Software rendering shows the performers first: the scenery takes longer to draw than they do.
-    if (!simpleMaterials) this.#addScenery();
+    if (!this.#frameRenderer.quality.simpleMaterials) this.#addScenery();
     // three.js registered its listener earlier: its part of the context is restored by then.
     canvas.addEventListener("webglcontextrestored", () => this.#onContextRestored());
     this.#applyQuality();
@@ -137,13 +155,16 @@ export class Stage {
     if (theme === this.#theme) return;
     this.#theme = theme;
     this.#look = LOOKS[theme];
-    applyLookToBackdrop(this.#backdrop, this.#look);
+    applyLookToBackdrop(this.#backdropUniforms, this.#look);
+    applyLookToVignette(this.#vignette, this.#look);
+    this.#bakedBackdrop.invalidate();
     this.#floor.applyLook(this.#look);
     this.#lights.applyLook(this.#look);
     this.#updateEnvironment();
     this.renderer.toneMappingExposure = this.#look.exposure;
     this.renderer.setClearColor(this.#look.backdrop.middle);
     this.#applyQuality();
+    this.#frameRenderer.invalidate();
   }
 
   /**
@@ -167,6 +188,7 @@ export class Stage {
   setPerformerFactory(factory: PerformerFactory | null, performer = 0): void {
     this.#performerGroup.setPerformerFactory(factory, performer);
     if (this.puppet) this.#compileShaders();
+    this.#frameRenderer.invalidate();
   }
 
   /**
@@ -229,37 +251,38 @@ export class Stage {
     this.#scenery.update(audience.view, audience.isAudienceView, seconds);
     if (hasPose && clock !== null) this.cameraRecorder.add(clock, audience.view, audience.isCustomView);
     if (hasPose) this.#updateStrings(states, seconds);
-    if (!this.#frameRenderer.advance(interval)) return;
+    this.scene.updateMatrixWorld();
+    const isOutdated = this.#frameRenderer.advance(interval, this.scene, audience.camera, [
+      this.scene.environmentIntensity,
+      ...rig.floorOffset,
+      this.#floorHeight.value,
+    ]);
+    if (!this.#frameRenderer.isReady) return;
     if (this.#firstFrame === "submitted") this.#firstFrame = "complete";
-    if (!hasPose && (this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S) return;
+    if (!isOutdated || (!hasPose && (this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S)) return;
     if (hasPose && this.#firstFrame === "pending") this.#firstFrame = "submitted";
     if (this.#firstFrame !== "submitted") this.#addScenery();
-    if (this.#frameRenderer.draw(this.scene, audience.camera, hasPose)) this.#applyQuality();
+    if (this.#frameRenderer.quality !== this.#appliedQuality) this.#applyQuality();
+    if (this.#backdrop.usesSimpleMaterials && this.#scenery.group.parent) this.#bakedBackdrop.update(this.renderer);
+    this.#frameRenderer.draw(this.scene, audience.camera, hasPose ? this.#edgeBox : null);
     this.#drawnHandles = this.#performerGroup.handles.map((at) => at && this.toScreen(at));
   }
 
   /** Release all graphics resources; the stage cannot draw afterwards. */
   dispose(): void {
     this.#performerGroup.dispose();
+    for (const part of [this.#backdrop, this.#bakedBackdrop, this.#floor]) part.dispose();
     this.scene.environment?.dispose();
     this.#frameRenderer.dispose();
   }
 
   /** Return the stage with its strings as PNG, in the best quality, whatever this machine normally draws. */
   takePicture(): Promise<Blob> {
-    const { mesh } = this.#floor;
-    const glossy = createFloor(this.#backdrop, this.#scenery.group, this.rig.floorOffset, false);
-    glossy.applyLook(this.#look);
-    this.#scenery.group.remove(mesh);
-    this.#scenery.group.add(glossy.mesh);
-    this.#applyQuality(QUALITY_LEVELS[0]);
+    this.#applyQuality(BEST_QUALITY);
     try {
       return this.#frameRenderer.takePicture(this.scene, this.audience.camera, this.#look);
     } finally {
       this.#applyQuality();
-      this.#scenery.group.remove(glossy.mesh);
-      this.#scenery.group.add(mesh);
-      glossy.dispose();
     }
   }
 
@@ -317,6 +340,18 @@ export class Stage {
     return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
   }
 
+  /** Box around all performers and control bars in the picture, in CSS pixels. */
+  get #edgeBox(): ScreenBox {
+    const at = new Vector3();
+    const boxes = this.#performerGroup.visiblePerformers.flatMap(({ joint, scale }) =>
+      OUTER_JOINTS.map((name) => this.#projection.boxAt(at.setFromMatrixPosition(joint(name)), EDGE_EXTENT, scale)),
+    );
+    const bars = this.performers.flatMap((_, performer) =>
+      LIMBS.map((_, limb) => this.barBox(limbNumber(performer, limb))).filter((box) => box !== null),
+    );
+    return unionOf([...boxes, ...bars]);
+  }
+
   #addScenery(): void {
     if (this.#scenery.group.parent) return;
     this.rig.group.add(this.#scenery.group);
@@ -356,8 +391,9 @@ export class Stage {
   /** The disc keeps its proportion to the performer. */
   #placeDisc(): void {
     const [radius, height] = this.#framing === "phone" || this.#framing === "sheet" ? [0.98, 1.36] : [1.06, 1.3];
-    this.#backdrop.discRadius.value = radius * this.audience.scale;
-    this.#backdrop.discCentre.value.set(0, height * this.audience.scale);
+    this.#backdropUniforms.discRadius.value = radius * this.audience.scale;
+    this.#backdropUniforms.discCentre.value.set(0, height * this.audience.scale);
+    this.#bakedBackdrop.invalidate();
   }
 
   #updateEnvironment(): void {
@@ -367,18 +403,22 @@ export class Stage {
       : createEnvironmentMap(this.renderer, this.#look);
   }
 
-  /** Restore what three.js does not: it uploads resources again, but does not render the environment map again. */
+  /** Restore what three.js does not: it uploads resources again, but does not render textures again. */
   #onContextRestored(): void {
     this.#updateEnvironment();
+    this.#bakedBackdrop.invalidate();
     this.#frameRenderer.reset();
   }
 
   /** Only the lacquer of the night look reflects, and only in a quality that allows it. */
-  #applyQuality({ reflection, shadows, simpleMaterials } = this.#frameRenderer.quality): void {
+  #applyQuality(quality = this.#frameRenderer.quality): void {
+    const { reflection, shadows, simpleMaterials } = quality;
+    this.#appliedQuality = quality;
     this.#lights.castsShadows = shadows;
     // Simple materials need no environment; a look that was chosen meanwhile has made none.
     if (!simpleMaterials && this.scene.environment === null) this.#updateEnvironment();
     this.#performerGroup.setQuality(this.#look.dark && reflection, simpleMaterials);
+    this.#backdrop.usesSimpleMaterials = this.#floor.usesSimpleMaterials = simpleMaterials;
   }
 
   #handReach(performers: readonly Performer[]): number {

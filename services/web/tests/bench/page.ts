@@ -30,12 +30,14 @@ import type { BenchContext, BenchFigures } from "./page/bench";
 import { benchConstrainedFirstPaint, benchFirstPaint } from "./page/first-paint";
 import { benchDrawCalls, benchFrameTime } from "./page/frame-cost";
 import { benchMemory } from "./page/memory";
+import { benchSoftwareRendering } from "./page/software";
 
 const CASES: Readonly<Record<string, (bench: BenchContext) => Promise<BenchFigures>>> = {
   arrival: benchFirstPaint,
   line: benchConstrainedFirstPaint,
   frames: benchFrameTime,
   drawing: benchDrawCalls,
+  software: benchSoftwareRendering,
   memory: benchMemory,
   audio: benchAudioSync,
   axe: benchAccessibility,

@@ -20,10 +20,9 @@ export const [LEFT_HAND, RIGHT_LEG] = [0, 3];
 
 /** Wait until the first pose is drawn. The first frame compiles the shaders, which blocks a slow machine. */
 export async function waitForFirstPose(page: Page): Promise<void> {
-  await page.waitForFunction(() => window.bunraku?.stage?.puppet?.group.visible);
-  // A frame starts only after the previous one is complete.
-  const frame = await page.evaluate(() => window.bunraku.stage.renderer.info.render.frame);
-  await page.waitForFunction((frame) => window.bunraku.stage.renderer.info.render.frame > frame + 1, frame);
+  await page.waitForFunction(
+    () => window.bunraku?.stage?.puppet?.group.visible && window.bunraku.stage.hasDrawnPerformer,
+  );
 }
 
 /**

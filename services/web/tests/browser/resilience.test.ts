@@ -250,25 +250,16 @@ function overflowingElements(): string[] {
 /** Return the RGBA bytes of the second frame from now: the first may still prepare resources. */
 async function readFrame(page: Page): Promise<Uint8Array> {
   // As base64: an array of numbers takes Playwright seconds to transfer.
-  const pixels = await page.evaluate(
-    () =>
-      new Promise<string>((resolve) => {
-        const { stage } = window.bunraku;
-        const { renderer } = stage;
-        const render = renderer.render;
-        let drawn = 0;
-        renderer.render = (scene, camera) => {
-          render.call(renderer, scene, camera);
-          if (scene !== stage.scene || ++drawn < 2) return;
-          renderer.render = render;
-          const gl = renderer.getContext();
-          const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
-          const pixels = new Uint8Array(4 * width * height);
-          gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-          resolve(btoa(Array.from(pixels, (value) => String.fromCharCode(value)).join("")));
-        };
-      }),
-  );
+  const pixels = await page.evaluate(() => {
+    const { renderer, scene, audience } = window.bunraku.stage;
+    // A canvas keeps its frame only until the end of the task that drew it.
+    renderer.render(scene, audience.camera);
+    const gl = renderer.getContext();
+    const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
+    const pixels = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+    return btoa(Array.from(pixels, (value) => String.fromCharCode(value)).join(""));
+  });
   return Buffer.from(pixels, "base64");
 }
 

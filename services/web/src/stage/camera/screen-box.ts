@@ -43,3 +43,13 @@ export function overlaps(a: ScreenBox, b: ScreenBox, margin = 0): boolean {
     a.left - margin < b.right && b.left < a.right + margin && a.top - margin < b.bottom && b.top < a.bottom + margin
   );
 }
+
+/** Return the smallest box around these (at least one). */
+export function unionOf(boxes: readonly ScreenBox[]): ScreenBox {
+  return {
+    left: Math.min(...boxes.map(({ left }) => left)),
+    top: Math.min(...boxes.map(({ top }) => top)),
+    right: Math.max(...boxes.map(({ right }) => right)),
+    bottom: Math.max(...boxes.map(({ bottom }) => bottom)),
+  };
+}

@@ -15,6 +15,12 @@ const FACE_WINDOW_M = [0.2, 0.26] as const;
 const HEAD_SCALE = 1.07;
 const CHIN_OFFSET_M = 0.11;
 
+/** Mesh of a puppet, and one with fewer triangles over the same vertices, for software rendering. */
+export interface PuppetGeometry {
+  readonly detailed: BufferGeometry;
+  readonly coarse: BufferGeometry;
+}
+
 export class GeometryBuilder {
   readonly #bones: ReadonlyMap<string, number>;
   readonly #fit: FitVertex;
@@ -26,6 +32,7 @@ export class GeometryBuilder {
   readonly #skinIndices: number[] = [];
   readonly #skinWeights: number[] = [];
   readonly #indices: number[] = [];
+  readonly #coarseIndices: number[] = [];
 
   constructor(bones: readonly string[], fit: FitVertex) {
     this.#bones = new Map(bones.map((name, index) => [name, index]));
@@ -68,13 +75,14 @@ export class GeometryBuilder {
       }
     }
     for (const index of surface.indices) this.#indices.push(index + first);
+    for (const index of surface.coarseIndices) this.#coarseIndices.push(index + first);
   }
 
   /**
    * Return the geometry of all parts, with attributes `finish` (roughness, metalness, clearcoat, wood) and `pattern`
-   * (u, v, kind).
+   * (u, v, kind), and the coarse one, which shares them.
    */
-  build(): BufferGeometry {
+  build(): PuppetGeometry {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(this.#positions, 3));
     geometry.setAttribute("normal", new Float32BufferAttribute(this.#normals, 3));
@@ -83,8 +91,11 @@ export class GeometryBuilder {
     geometry.setAttribute("pattern", new Float32BufferAttribute(this.#patterns, 3));
     geometry.setAttribute("skinIndex", new Uint16BufferAttribute(this.#skinIndices, 4));
     geometry.setAttribute("skinWeight", new Float32BufferAttribute(this.#skinWeights, 4));
+    const coarse = new BufferGeometry();
+    for (const [name, values] of Object.entries(geometry.attributes)) coarse.setAttribute(name, values);
     geometry.setIndex(this.#indices);
-    return geometry;
+    coarse.setIndex(this.#coarseIndices);
+    return { detailed: geometry, coarse };
   }
 
   #boneIndex(bone: string): number {
@@ -123,6 +134,8 @@ function orientOutward(surface: Surface, facesInward: boolean): void {
     agreement += face.dot(n.fromArray(normals, indices[i] * 3));
   }
   const flip = volume > 0 === facesInward;
-  if (flip) for (let i = 0; i < indices.length; i += 3) [indices[i], indices[i + 1]] = [indices[i + 1], indices[i]];
+  if (flip)
+    for (const list of [indices, surface.coarseIndices])
+      for (let i = 0; i < list.length; i += 3) [list[i], list[i + 1]] = [list[i + 1], list[i]];
   if (agreement > 0 === flip) for (let i = 0; i < normals.length; i++) normals[i] = -normals[i];
 }

@@ -1,6 +1,7 @@
 /** The puppet's material: three.js's physical shading, with finish, pattern and wood from vertex attributes. */
-import { BackSide, type IUniform, MeshLambertMaterial, MeshPhysicalMaterial, type Texture } from "three";
+import { BackSide, Color, type IUniform, MeshPhysicalMaterial, ShaderMaterial, type Texture } from "three";
 import { NOISE_GLSL } from "../scenery/noise";
+import { createDistantLights, LIGHT_COUNT } from "./distant-lights";
 
 const VERTEX_HEADER_GLSL = /* glsl */ `
 attribute vec4 finish; attribute vec3 pattern;
@@ -30,6 +31,18 @@ if (vFinish.w > 0.) {
 #endif
 `;
 
+/**
+ * Skinning without the bones that have no weight: most of the figure is rigid, and each bone costs four texture reads.
+ * The mesh is bound where it is modelled, so its bind matrices are identities.
+ */
+const SKIN_MATRIX_GLSL = /* glsl */ `
+mat4 skin = getBoneMatrix(skinIndex.x);
+if (skinWeight.x < 1.) {
+  skin = skin * skinWeight.x + getBoneMatrix(skinIndex.y) * skinWeight.y;
+  if (skinWeight.z > 0.) skin += getBoneMatrix(skinIndex.z) * skinWeight.z + getBoneMatrix(skinIndex.w) * skinWeight.w;
+}
+`;
+
 /** Values of PATTERN in finish.ts: 1 face, 2 asanoha, 3 weave, 4 stripe. */
 const COLOUR_GLSL = /* glsl */ `
 #include <color_fragment>
@@ -57,25 +70,56 @@ if (vPattern.z > 3.5) {
 ${WOOD_GLSL}
 `;
 
+const SIMPLE_VERTEX_GLSL = /* glsl */ `
+#include <skinning_pars_vertex>
+${VERTEX_HEADER_GLSL}
+varying vec3 vColour, vNormal;
+void main() {
+  ${SKIN_MATRIX_GLSL}
+  vFinish = finish; vPattern = pattern; vRest = position; vSeed = skinIndex.x; vFront = normal.z;
+  gl_Position = projectionMatrix * modelViewMatrix * (skin * vec4(position, 1.));
+  vColour = color;
+  vNormal = normalMatrix * (mat3(skin) * normal);
+}`;
+const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
+${FRAGMENT_HEADER_GLSL}
+uniform vec3 ambient, lightDirections[${LIGHT_COUNT}], lightColours[${LIGHT_COUNT}];
+varying vec3 vColour, vNormal;
+void main() {
+  vec4 diffuseColor = vec4(vColour, 1.);
+  ${COLOUR_GLSL.replace("#include <color_fragment>", "")}
+  vec3 normal = normalize(vNormal);
+  vec3 irradiance = ambient;
+  for (int i = 0; i < ${LIGHT_COUNT}; i++) irradiance += max(dot(normal, lightDirections[i]), 0.) * lightColours[i];
+  gl_FragColor = vec4(diffuseColor.rgb * irradiance, 1.);
+  #include <tonemapping_fragment>
+  #include <colorspace_fragment>
+}`;
+
+/** Light from everywhere, in place of that of the environment map. */
+const AMBIENT = new Color(0.22, 0.22, 0.22);
+
 /** Create the material for software rendering: colours, patterns and light, without lacquer, grain or reflections. */
-export function createSimpleFigureMaterial(textures: PuppetTextures): MeshLambertMaterial {
-  const material = new MeshLambertMaterial({ vertexColors: true });
-  material.defines = { PLAIN: "" };
-  material.customProgramCacheKey = () => "figure-simple";
-  material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, { facePaint: { value: textures.face }, hempLeaf: { value: textures.asanoha } });
-    patchVertexShader(shader);
-    shader.fragmentShader = shader.fragmentShader
-      .replace("#include <common>", `#include <common>\n${FRAGMENT_HEADER_GLSL}`)
-      .replace("#include <color_fragment>", COLOUR_GLSL)
-      // A little emission replaces the light of the environment map.
-      .replace("#include <emissivemap_fragment>", "totalEmissiveRadiance = diffuseColor.rgb * .16;");
-  };
-  return material;
+export function createSimpleFigureMaterial(textures: PuppetTextures): ShaderMaterial {
+  return new ShaderMaterial({
+    uniforms: {
+      ...createDistantLights(),
+      ambient: { value: AMBIENT },
+      facePaint: { value: textures.face },
+      hempLeaf: { value: textures.asanoha },
+    },
+    defines: { PLAIN: "" },
+    vertexColors: true,
+    vertexShader: SIMPLE_VERTEX_GLSL,
+    fragmentShader: SIMPLE_FRAGMENT_GLSL,
+  });
 }
 
 function patchVertexShader(shader: { vertexShader: string }): void {
   shader.vertexShader = shader.vertexShader
+    .replace("#include <skinbase_vertex>", SKIN_MATRIX_GLSL)
+    .replace("#include <skinnormal_vertex>", "objectNormal = mat3(skin) * objectNormal;")
+    .replace("#include <skinning_vertex>", "transformed = (skin * vec4(transformed, 1.)).xyz;")
     .replace("#include <common>", `#include <common>\n${VERTEX_HEADER_GLSL}`)
     .replace(
       "#include <begin_vertex>",

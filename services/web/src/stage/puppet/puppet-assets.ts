@@ -1,8 +1,17 @@
 /** Shared assets of the puppets of one stage: materials for all, one mesh for equal limb lengths. */
-import type { BufferGeometry, IUniform, Material } from "three";
+import {
+  type Camera,
+  type IUniform,
+  type Material,
+  type Matrix4,
+  type Scene,
+  type ShaderMaterial,
+  Vector3,
+} from "three";
 import { type Figure, figureKey, JOINTS } from "../../motion/skeleton";
+import { type DistantLights, updateDistantLights } from "./distant-lights";
 import { fitToFigure } from "./figure-fit";
-import { GeometryBuilder } from "./geometry-builder";
+import { GeometryBuilder, type PuppetGeometry } from "./geometry-builder";
 import { createFigureMaterial, createSimpleFigureMaterial, type PuppetTextures } from "./material";
 import { addArms } from "./parts/arms";
 import { addBodice } from "./parts/bodice";
@@ -14,8 +23,10 @@ import { addSleeves } from "./parts/sleeves";
 /** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
 export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
 
+const centre = new Vector3();
+
 /** Build all parts on a figure in its rest pose. Needs no graphics context. */
-export function buildPuppetGeometry(figure: Figure): BufferGeometry {
+export function buildPuppetGeometry(figure: Figure): PuppetGeometry {
   const builder = new GeometryBuilder(BONES, fitToFigure(figure));
   for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(builder);
   return builder.build();
@@ -26,8 +37,8 @@ export class PuppetAssets {
   /** Material of the reflection. */
   readonly mirroredMaterial: Material;
   readonly #textures: PuppetTextures;
-  #simpleMaterial: Material | null = null;
-  readonly #geometries = new Map<string, BufferGeometry>();
+  #simpleMaterial: ShaderMaterial | null = null;
+  readonly #geometries = new Map<string, PuppetGeometry>();
 
   /** `floorAt` is the height of the reflecting floor. */
   constructor(textures: PuppetTextures, floorHeight: IUniform<number>) {
@@ -41,8 +52,20 @@ export class PuppetAssets {
     return (this.#simpleMaterial ??= createSimpleFigureMaterial(this.#textures));
   }
 
-  /** Return the mesh for a figure, built once per set of limb lengths. */
-  geometryFor(figure: Figure): BufferGeometry {
+  /** Light the simple material as a performer gets it whose root is there. Called before each draw. */
+  lightSimpleMaterial(scene: Scene, camera: Camera, root: Matrix4): void {
+    if (!this.#simpleMaterial) return;
+    updateDistantLights(
+      this.#simpleMaterial.uniforms as DistantLights,
+      scene,
+      camera,
+      centre.setFromMatrixPosition(root),
+    );
+    this.#simpleMaterial.uniformsNeedUpdate = true;
+  }
+
+  /** Return the meshes for a figure, built once per set of limb lengths. */
+  geometryFor(figure: Figure): PuppetGeometry {
     const key = figureKey(figure);
     let geometry = this.#geometries.get(key);
     if (!geometry) this.#geometries.set(key, (geometry = buildPuppetGeometry(figure)));
@@ -54,7 +77,8 @@ export class PuppetAssets {
     const keysToKeep = new Set(figures.map(figureKey));
     for (const [key, geometry] of this.#geometries) {
       if (keysToKeep.has(key)) continue;
-      geometry.dispose();
+      geometry.detailed.dispose();
+      geometry.coarse.dispose();
       this.#geometries.delete(key);
     }
   }

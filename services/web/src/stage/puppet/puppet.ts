@@ -12,6 +12,7 @@ import {
 } from "three";
 import { type Figure, JOINTS, PARENTS, type Pose } from "../../motion/skeleton";
 import { figureScale, restPositions } from "./figure-fit";
+import type { PuppetGeometry } from "./geometry-builder";
 import { floorHeight, handlePosition, type Performer } from "./performer";
 import { BONES, type PuppetAssets } from "./puppet-assets";
 import { SleeveBone } from "./sleeve-bone";
@@ -26,6 +27,7 @@ export class Puppet implements Performer {
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
   readonly #assets: PuppetAssets;
+  readonly #geometry: PuppetGeometry;
   readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
   readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
 
@@ -39,12 +41,13 @@ export class Puppet implements Performer {
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
     this.group.updateMatrixWorld(true);
     const skeleton = new Skeleton(this.#bones);
-    const geometry = assets.geometryFor(figure);
-    this.#mesh = new SkinnedMesh(geometry, assets.material);
+    this.#geometry = assets.geometryFor(figure);
+    const { detailed } = this.#geometry;
+    this.#mesh = new SkinnedMesh(detailed, assets.material);
     this.#mesh.name = "figure";
     this.#mesh.castShadow = true;
     this.#mesh.receiveShadow = true;
-    this.#reflection = new SkinnedMesh(geometry, assets.mirroredMaterial);
+    this.#reflection = new SkinnedMesh(detailed, assets.mirroredMaterial);
     this.#reflection.renderOrder = -1;
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
@@ -52,6 +55,7 @@ export class Puppet implements Performer {
       // Without a bounding sphere three.js skins the whole mesh to find its depth for sorting.
       mesh.boundingSphere = new Sphere();
     }
+    this.#mesh.onBeforeRender = (_renderer, scene, camera) => assets.lightSimpleMaterial(scene, camera, this.root);
     this.group.add(this.#mesh);
     const rest = restPositions(figure);
     this.#sleeves = SIDES.map(({ side }) => {
@@ -81,6 +85,7 @@ export class Puppet implements Performer {
 
   set usesSimpleMaterials(on: boolean) {
     this.#mesh.material = on ? this.#assets.simpleMaterial : this.#assets.material;
+    this.#mesh.geometry = on ? this.#geometry.coarse : this.#geometry.detailed;
   }
 
   apply(pose: Pose, seconds: number): void {

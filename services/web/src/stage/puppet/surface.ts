@@ -1,12 +1,16 @@
 /** Parametric surfaces as vertex lists, from which all parts of the puppet are made. Metres. */
 import { CatmullRomCurve3, Quaternion, Vector3 } from "three";
 
-/** Vertices and triangles of a part: three numbers per vertex, two for `uvs`; triangles in `indices`. */
+/**
+ * Vertices and triangles of a part: three numbers per vertex, two for `uvs`; triangles in `indices`, and fewer of them
+ * over the same vertices in `coarseIndices`, for software rendering.
+ */
 export interface Surface {
   positions: number[];
   normals: number[];
   uvs: number[];
   indices: number[];
+  coarseIndices: number[];
 }
 
 export type SurfaceFunction = (u: number, v: number) => Vector3;
@@ -14,6 +18,9 @@ export type UvFunction = (u: number, v: number, at: Vector3) => readonly [number
 
 const DOWN = new Vector3(0, -1, 0);
 const DERIVATIVE_STEP = 1e-3;
+/** Grids with fewer cells across and along keep them all in their coarse triangles. */
+const MIN_COARSE_COLUMNS = 12;
+const MIN_COARSE_ROWS = 6;
 
 /** Return a smooth step from 0 at `from` to 1 at `to`, which may be smaller than `from`. */
 export function smoothStep(from: number, to: number, x: number): number {
@@ -58,7 +65,7 @@ export function curve(keys: readonly (readonly number[])[]): (t: number) => read
  * surface, so that a seam (u = 0 and u = 1) shades evenly; `at` must accept u slightly outside 0..1.
  */
 export function grid(at: SurfaceFunction, columns: number, rows: number, uv?: UvFunction): Surface {
-  const surface: Surface = { positions: [], normals: [], uvs: [], indices: [] };
+  const surface: Surface = { positions: [], normals: [], uvs: [], indices: [], coarseIndices: [] };
   for (let j = 0; j <= rows; j++) {
     for (let i = 0; i <= columns; i++) {
       const u = i / columns;
@@ -73,14 +80,30 @@ export function grid(at: SurfaceFunction, columns: number, rows: number, uv?: Uv
       surface.uvs.push(...(uv ? uv(u, v, point) : [u, v]));
     }
   }
-  for (let j = 0; j < rows; j++) {
-    for (let i = 0; i < columns; i++) {
-      const a = j * (columns + 1) + i;
-      const c = a + columns + 1;
-      surface.indices.push(a, a + 1, c, a + 1, c + 1, c);
-    }
-  }
+  surface.indices = triangulate(columns, lines(columns, 1), lines(rows, 1));
+  surface.coarseIndices = triangulate(
+    columns,
+    lines(columns, columns >= MIN_COARSE_COLUMNS ? 2 : 1),
+    lines(rows, rows >= MIN_COARSE_ROWS ? 2 : 1),
+  );
   return surface;
+}
+
+/** Return the numbers of every `step`th line of a grid of `cells`, and of the last. */
+function lines(cells: number, step: number): number[] {
+  return [...Array.from({ length: Math.ceil(cells / step) }, (_, at) => at * step), cells];
+}
+
+/** Return the triangles between these columns and rows of a grid that is `columns` cells wide. */
+function triangulate(columns: number, across: readonly number[], along: readonly number[]): number[] {
+  const vertex = (column: number, row: number) => row * (columns + 1) + column;
+  return along.slice(1).flatMap((nextRow, j) =>
+    across.slice(1).flatMap((nextColumn, i) => {
+      const [a, b] = [vertex(across[i], along[j]), vertex(nextColumn, along[j])];
+      const [c, d] = [vertex(across[i], nextRow), vertex(nextColumn, nextRow)];
+      return [a, b, c, b, d, c];
+    }),
+  );
 }
 
 function surfaceNormal(at: SurfaceFunction, u: number, v: number): Vector3 {
@@ -237,7 +260,7 @@ export function tube(
 
 /** Return a flat-faced box rotated about z: knots and bows of stiff cloth. */
 export function box(centre: Vector3, size: readonly [number, number, number], turnZ: number): Surface {
-  const surface: Surface = { positions: [], normals: [], uvs: [], indices: [] };
+  const surface: Surface = { positions: [], normals: [], uvs: [], indices: [], coarseIndices: [] };
   const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), turnZ);
   for (let axis = 0; axis < 3; axis++) {
     for (const sign of [1, -1]) {
@@ -261,5 +284,6 @@ export function box(centre: Vector3, size: readonly [number, number, number], tu
       surface.indices.push(first + a, first + b, first + c, first + a, first + c, first + d);
     }
   }
+  surface.coarseIndices = [...surface.indices];
   return surface;
 }

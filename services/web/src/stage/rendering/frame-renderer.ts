@@ -1,33 +1,55 @@
 /** Draws frames on the stage's canvas, one at a time and in a quality that the machine can keep up with. */
 import { ACESFilmicToneMapping, PCFShadowMap, type PerspectiveCamera, type Scene, Vector2, WebGLRenderer } from "three";
+import type { ScreenBox } from "../camera/screen-box";
 import type { Look } from "../scenery/look";
+import { EdgeSmoothing } from "./edge-smoothing";
 import { FrameFence } from "./frame-fence";
 import type { Graphics } from "./graphics";
 import { PictureRenderer, pictureSize } from "./picture";
 import type { AdaptiveQuality, Quality } from "./quality";
+import { SceneWatcher } from "./scene-watcher";
+
+/** A stage that does not change for this time is drawn once more in the best quality, in seconds. */
+const STILL_S = 0.15;
+/** Callbacks over which the interval of the display is the shortest. */
+const DISPLAY_CALLBACKS = 30;
 
 export class FrameRenderer {
   readonly renderer: WebGLRenderer;
   readonly #quality: AdaptiveQuality;
   readonly #fence: FrameFence;
+  readonly #watcher = new SceneWatcher();
   readonly #pictures = new PictureRenderer();
+  /** Null if the context has antialiasing. */
+  readonly #smoothing: EdgeSmoothing | null;
   #width = 1;
   #height = 1;
   #pixelRatio = 1;
   #sinceDrawnS = 0;
+  #stillS = 0;
+  /** Quality of the last frame, null if the canvas does not show one. */
+  #drawnQuality: Quality | null = null;
+  readonly #intervals: number[] = [];
   #isTakingPicture = false;
 
   constructor(canvas: HTMLCanvasElement, { context, quality }: Graphics) {
     this.#quality = quality;
     this.#fence = new FrameFence(context);
+    this.#smoothing = context.getContextAttributes()?.antialias ? null : new EdgeSmoothing();
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = PCFShadowMap;
   }
 
+  /** Quality of the next frame: the best once the stage stands still. */
   get quality(): Quality {
-    return this.#quality.quality;
+    return this.#stillS >= STILL_S ? this.#quality.bestQuality : this.#quality.quality;
+  }
+
+  /** True if the last frame is complete and another can be drawn. */
+  get isReady(): boolean {
+    return this.#fence.isReady;
   }
 
   /** Set the size of the canvas in CSS pixels. It takes effect with the next frame. */
@@ -37,20 +59,42 @@ export class FrameRenderer {
     this.#pixelRatio = pixelRatio;
   }
 
-  /** Add the seconds since the last call. Return whether the last frame is complete and another can be drawn. */
-  advance(seconds: number): boolean {
-    this.#sinceDrawnS += seconds;
-    return this.#fence.isReady;
+  /** Draw the next frame, even if nothing seems to have moved. */
+  invalidate(): void {
+    this.#drawnQuality = null;
   }
 
-  /** Draw a frame. Return whether the quality has changed; only a measured frame can change it. */
-  draw(scene: Scene, camera: PerspectiveCamera, isMeasured: boolean): boolean {
+  /**
+   * Advance by `seconds`, the time since the last call, to the present state of the scene; `further` are numbers that
+   * affect the picture beside it. Return whether it differs from what the canvas shows.
+   */
+  advance(seconds: number, scene: Scene, camera: PerspectiveCamera, further: readonly number[]): boolean {
+    if (seconds > 0) this.#intervals.push(seconds);
+    if (this.#intervals.length > DISPLAY_CALLBACKS) this.#intervals.shift();
+    const size = [this.#width, this.#height, this.#pixelRatio];
+    const hasChanged = this.#watcher.hasChanged(scene, camera, [...size, ...further]);
+    this.#stillS = hasChanged ? 0 : this.#stillS + seconds;
+    const isOutdated = hasChanged || this.#drawnQuality !== this.quality;
+    this.#sinceDrawnS = isOutdated ? this.#sinceDrawnS + seconds : 0;
+    return isOutdated;
+  }
+
+  /**
+   * Draw a frame. `edges` is the box that all edges are in, in CSS pixels; null if there are none. Only the times of
+   * frames with edges, in the same quality one after the other, are measured.
+   */
+  draw(scene: Scene, camera: PerspectiveCamera, edges: ScreenBox | null): void {
+    const { quality } = this;
     this.#applySize();
     this.renderer.render(scene, camera);
+    if (edges) this.#smoothing?.apply(this.renderer, this.#toShares(edges));
     this.#fence.insert();
-    const hasChanged = isMeasured && !this.#isTakingPicture && this.#quality.addFrameTime(this.#sinceDrawnS);
+    this.#watcher.markDrawn();
+    const isContinued = this.#drawnQuality === quality && quality === this.#quality.quality;
+    if (edges && isContinued && !this.#isTakingPicture)
+      this.#quality.addFrameTime(this.#sinceDrawnS, Math.min(...this.#intervals));
+    this.#drawnQuality = quality;
     this.#sinceDrawnS = 0;
-    return hasChanged;
   }
 
   /** Render the scene to a PNG in a resolution of at least twice the canvas. */
@@ -66,14 +110,25 @@ export class FrameRenderer {
   reset(): void {
     this.#fence.reset();
     this.#quality.restart();
+    this.invalidate();
     this.#sinceDrawnS = 0;
   }
 
   dispose(): void {
     this.#pictures.dispose();
+    this.#smoothing?.dispose();
     this.renderer.dispose();
     // Frees the context's memory at once: browsers keep few contexts and would take one from another stage.
     this.renderer.forceContextLoss();
+  }
+
+  #toShares({ left, top, right, bottom }: ScreenBox): ScreenBox {
+    return {
+      left: left / this.#width,
+      top: top / this.#height,
+      right: right / this.#width,
+      bottom: bottom / this.#height,
+    };
   }
 
   /** Resize the canvas right before drawing, since resizing clears it, and only if the size has changed. */

@@ -9,18 +9,37 @@ export interface Quality {
   simpleMaterials: boolean;
 }
 
-export const QUALITY_LEVELS: readonly Quality[] = [
-  { pixelRatioScale: 1, reflection: true, shadows: true, simpleMaterials: false },
-  { pixelRatioScale: 0.75, reflection: true, shadows: true, simpleMaterials: false },
-  { pixelRatioScale: 0.6, reflection: false, shadows: true, simpleMaterials: false },
-  { pixelRatioScale: 0.5, reflection: false, shadows: false, simpleMaterials: true },
-  { pixelRatioScale: 0.35, reflection: false, shadows: false, simpleMaterials: true },
-];
+/** Quality of pictures, of a still stage and of a machine that is fast enough. */
+export const BEST_QUALITY: Quality = { pixelRatioScale: 1, reflection: true, shadows: true, simpleMaterials: false };
+const WITHOUT_REFLECTION: Quality = { ...BEST_QUALITY, reflection: false };
+const SIMPLE: Quality = { pixelRatioScale: 1, reflection: false, shadows: false, simpleMaterials: true };
 
-/** The quality is reduced if the median frame is slower than this, in seconds (24 frames per second). */
-const SLOW_FRAME_S = 1 / 24;
-/** The quality may rise if the median frame is faster than this, in seconds (27 frames per second). */
-const FAST_FRAME_S = 1 / 27;
+/** Levels with a graphics processor, from the best: first fewer pixels, then less detail, in small steps. */
+export const GRAPHICS_LEVELS: readonly Quality[] = [
+  BEST_QUALITY,
+  { ...BEST_QUALITY, pixelRatioScale: 0.9 },
+  { ...BEST_QUALITY, pixelRatioScale: 0.8 },
+  { ...WITHOUT_REFLECTION, pixelRatioScale: 0.8 },
+  { ...WITHOUT_REFLECTION, pixelRatioScale: 0.7 },
+  { ...WITHOUT_REFLECTION, pixelRatioScale: 0.6 },
+  { ...SIMPLE, pixelRatioScale: 0.7 },
+  { ...SIMPLE, pixelRatioScale: 0.6 },
+];
+/** Levels without a graphics processor. */
+export const SOFTWARE_LEVELS: readonly Quality[] = [1, 0.9, 0.8, 0.75, 0.7, 0.6].map((pixelRatioScale) => ({
+  ...SIMPLE,
+  pixelRatioScale,
+}));
+/** Level that software rendering starts with. */
+const FIRST_SOFTWARE_LEVEL = 3;
+
+/** Frame times that are aimed at, in seconds. */
+const GRAPHICS_TARGET_S = 1 / 60;
+const SOFTWARE_TARGET_S = 1 / 30;
+/** The quality is reduced if the median frame takes longer than this multiple of the target. */
+const SLOW = 1.25;
+/** The quality may rise if the median frame takes less than this multiple of the target. */
+const FAST = 1.11;
 /** Frames per median; few, since slow frames are also rare. */
 const WINDOW_FRAMES = 6;
 /**
@@ -32,21 +51,19 @@ const PAUSE_S = 8;
 /** The first frames compile shaders and are not measured. */
 const WARM_UP_FRAMES = 3;
 /** Time of fast frames before the next better level is tried, in seconds. */
-const FIRST_TRIAL_S = 10;
+const FIRST_TRIAL_S = 5;
 /** A level that turned out too slow is tried again after twice the time, at most after this, in seconds. */
 const MAX_TRIAL_S = 320;
 /** A better level that was fast for this long is kept, in seconds. */
-const TRIAL_DURATION_S = 10;
-/** Best level on a machine without a graphics processor. */
-const SOFTWARE_LEVEL = 3;
-
+const TRIAL_DURATION_S = 5;
 /**
  * Chooses the quality by the time between frames. How much time a frame leaves is not known, since frames wait for the
  * display: a better level is tried, and given up if it is too slow.
  */
 export class AdaptiveQuality {
-  readonly #pinned: boolean;
-  readonly #best: number;
+  readonly #isPinned: boolean;
+  readonly #levels: readonly Quality[];
+  readonly #targetS: number;
   #level: number;
   #framesToSkip = WARM_UP_FRAMES;
   readonly #frameTimes: number[] = [];
@@ -57,13 +74,20 @@ export class AdaptiveQuality {
 
   /** `renderer` is the name of the graphics driver; `pinned` keeps the best quality, however slow. */
   constructor(renderer: string, pinned: boolean) {
-    this.#pinned = pinned;
-    this.#best = !pinned && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer) ? SOFTWARE_LEVEL : 0;
-    this.#level = this.#best;
+    const isSoftware = !pinned && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
+    this.#isPinned = pinned;
+    this.#levels = isSoftware ? SOFTWARE_LEVELS : GRAPHICS_LEVELS;
+    this.#targetS = isSoftware ? SOFTWARE_TARGET_S : GRAPHICS_TARGET_S;
+    this.#level = isSoftware ? FIRST_SOFTWARE_LEVEL : 0;
   }
 
   get quality(): Quality {
-    return QUALITY_LEVELS[this.#level];
+    return this.#levels[this.#level];
+  }
+
+  /** Quality of a stage that stands still. */
+  get bestQuality(): Quality {
+    return this.#levels[0];
   }
 
   /** Skip the next frames: the machine was busy with something else, or shaders are compiled again. */
@@ -72,9 +96,12 @@ export class AdaptiveQuality {
     this.#framesToSkip = WARM_UP_FRAMES;
   }
 
-  /** Add the seconds since the last frame. Return whether the quality has changed. */
-  addFrameTime(seconds: number): boolean {
-    if (this.#pinned) return false;
+  /**
+   * Add the seconds since the last frame. `displayS` is the interval at which the display lets frames be drawn: no
+   * quality makes them faster. Return whether the quality has changed.
+   */
+  addFrameTime(seconds: number, displayS = 0): boolean {
+    if (this.#isPinned) return false;
     if (seconds > PAUSE_S) {
       this.#frameTimes.length = 0;
       return false;
@@ -89,16 +116,18 @@ export class AdaptiveQuality {
     const windowS = sorted.reduce((sum, time) => sum + time, 0);
     this.#frameTimes.length = 0;
     const median = seconds < VERY_SLOW_FRAME_S ? sorted[WINDOW_FRAMES >> 1] : seconds;
-    if (median > SLOW_FRAME_S) return this.#reduce(median);
-    if (median < FAST_FRAME_S) this.#fastS += windowS;
+    const targetS = Math.max(this.#targetS, displayS);
+    if (median > SLOW * targetS) return this.#reduce(median / targetS);
+    if (median < FAST * targetS) this.#fastS += windowS;
     return this.#raise();
   }
 
-  #reduce(median: number): boolean {
+  /** `slowness` is the frame time as a multiple of the target. */
+  #reduce(slowness: number): boolean {
     if (this.#isTrial) this.#trialAfterS = Math.min(2 * this.#trialAfterS, MAX_TRIAL_S);
-    // At a third of the frame rate, reduce by two levels at once, so that a weak machine recovers sooner.
-    const steps = median > 3 * SLOW_FRAME_S && !this.#isTrial ? 2 : 1;
-    return this.#changeLevel(Math.min(QUALITY_LEVELS.length - 1, this.#level + steps), false);
+    // Several levels at once, so that a weak machine recovers sooner.
+    const steps = this.#isTrial ? 1 : slowness > 4 ? 4 : slowness > 2 ? 2 : 1;
+    return this.#changeLevel(Math.min(this.#levels.length - 1, this.#level + steps), false);
   }
 
   /** Keep a level that has proved fast, and try the next better one when it is time. */
@@ -107,14 +136,14 @@ export class AdaptiveQuality {
       this.#isTrial = false;
       this.#trialAfterS = FIRST_TRIAL_S;
     }
-    return this.#fastS >= this.#trialAfterS && this.#changeLevel(Math.max(this.#best, this.#level - 1), true);
+    return this.#fastS >= this.#trialAfterS && this.#changeLevel(Math.max(0, this.#level - 1), true);
   }
 
   #changeLevel(level: number, isTrial: boolean): boolean {
     this.#fastS = 0;
     if (level === this.#level) return false;
     this.#isTrial = isTrial;
-    const recompiles = QUALITY_LEVELS[level].simpleMaterials !== this.quality.simpleMaterials;
+    const recompiles = this.#levels[level].simpleMaterials !== this.quality.simpleMaterials;
     this.#level = level;
     this.#framesToSkip = recompiles ? WARM_UP_FRAMES : 1;
     return true;

@@ -2,11 +2,22 @@
  * Backdrop: the disc of gold leaf on its ground, a plane behind the stage. The floor reflects the same GLSL function.
  */
 import { Color, type IUniform, Mesh, PlaneGeometry, ShaderMaterial, Vector2 } from "three";
+import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 import type { Look } from "./look";
 import { NOISE_GLSL } from "./noise";
+import {
+  updateVignette,
+  VIGNETTE_GLSL,
+  VIGNETTE_VARYING_GLSL,
+  VIGNETTE_VERTEX_GLSL,
+  type VignetteUniforms,
+} from "./vignette";
 
 /** Position of the plane, in metres along z from the centre of the stage. */
 export const BACKDROP_Z_M = -2.6;
+
+/** Width and height of the plane in metres. */
+const SIZE_M = [26, 14] as const;
 
 export interface BackdropUniforms {
   [name: string]: IUniform;
@@ -72,34 +83,89 @@ export function applyLookToBackdrop(uniforms: BackdropUniforms, look: Look): voi
 }
 
 /**
- * Create the plane, in the frame of the rig that follows the performers. In the day look it is not tone mapped: the
- * film curve would grey the paper.
+ * GLSL for materials that three.js does not map tones of: `vec3 displayedBackdrop(vec2 at, float blur)`. In the day look it is not tone mapped: the film
+ * curve would grey the paper.
  */
-export function createBackdrop(uniforms: BackdropUniforms): Mesh {
-  const material = new ShaderMaterial({
-    uniforms,
+export const DISPLAYED_BACKDROP_GLSL = /* glsl */ `
+#include <tonemapping_pars_fragment>
+${BACKDROP_GLSL}
+vec3 displayedBackdrop(vec2 at, float blur) {
+  vec3 paper = backdrop(at, blur);
+  return sRGBTransferOETF(vec4(mix(paper, ACESFilmicToneMapping(paper), dark), 1.)).rgb;
+}
+`;
+
+export interface Backdrop {
+  readonly mesh: Mesh;
+  /** Draws the baked function. */
+  usesSimpleMaterials: boolean;
+  dispose(): void;
+}
+
+/** Create the plane, in the frame of the rig that follows the performers. */
+export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUniforms, baked: BakedUniforms): Backdrop {
+  const detailed = new ShaderMaterial({
+    uniforms: { ...uniforms, ...vignette },
     depthWrite: false,
-    vertexShader: /* glsl */ `
-      varying vec2 vAt;
-      void main() {
-        vAt = position.xy + vec2(0., 5.);
-        gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
-      }`,
-    fragmentShader: /* glsl */ `
-      ${BACKDROP_GLSL}
-      varying vec2 vAt;
-      void main() {
-        gl_FragColor = vec4(backdrop(vAt, 0.), 1.);
-        vec4 paper = gl_FragColor;
-        #include <tonemapping_fragment>
-        gl_FragColor = mix(paper, gl_FragColor, dark);
-        #include <colorspace_fragment>
-        gl_FragColor.rgb += (hash2(gl_FragCoord.xy) - .5) / 160.;
-      }`,
+    toneMapped: false,
+    vertexShader: VERTEX_GLSL,
+    fragmentShader: FRAGMENT_GLSL,
   });
-  const mesh = new Mesh(new PlaneGeometry(26, 14), material);
+  const simple = new ShaderMaterial({
+    uniforms: { ...vignette, ...baked },
+    depthWrite: false,
+    toneMapped: false,
+    vertexShader: SIMPLE_VERTEX_GLSL,
+    fragmentShader: SIMPLE_FRAGMENT_GLSL,
+  });
+  const [plane, grid] = [new PlaneGeometry(...SIZE_M), new PlaneGeometry(...SIZE_M, 52, 28)];
+  const mesh = new Mesh<PlaneGeometry, ShaderMaterial>(plane, detailed);
   mesh.name = "backdrop";
   mesh.position.set(0, 5, BACKDROP_Z_M);
-  mesh.renderOrder = -5;
-  return mesh;
+  mesh.onBeforeRender = updateVignette(vignette);
+  const backdrop = {
+    mesh,
+    get usesSimpleMaterials() {
+      return mesh.material === simple;
+    },
+    set usesSimpleMaterials(on) {
+      mesh.material = on ? simple : detailed;
+      mesh.geometry = on ? grid : plane;
+      // The reflection is drawn over it and shows through the floor; without one, it is drawn only where nothing covers it.
+      mesh.renderOrder = on ? 3 : -5;
+    },
+    dispose() {
+      for (const part of [plane, grid, detailed, simple]) part.dispose();
+    },
+  };
+  backdrop.usesSimpleMaterials = false;
+  return backdrop;
 }
+
+const VERTEX_GLSL = /* glsl */ `
+varying vec2 vAt;
+void main() {
+  vAt = position.xy + vec2(0., 5.);
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+}`;
+const SIMPLE_VERTEX_GLSL = /* glsl */ `
+${BAKED_GLSL}
+${VIGNETTE_VERTEX_GLSL}
+varying vec2 vPlace;
+void main() {
+  vPlace = bakedPlace(position.xy + vec2(0., 5.));
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+  setVignette();
+}`;
+const FRAGMENT_GLSL = /* glsl */ `
+${DISPLAYED_BACKDROP_GLSL}
+${VIGNETTE_GLSL}
+varying vec2 vAt;
+void main() {
+  gl_FragColor = vec4(withVignette(displayedBackdrop(vAt, 0.)) + (hash2(gl_FragCoord.xy) - .5) / 160., 1.);
+}`;
+const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
+${BAKED_GLSL}
+${VIGNETTE_VARYING_GLSL}
+varying vec2 vPlace;
+void main() { gl_FragColor = vec4(withVignette(texture2D(bakedSharp, vPlace).rgb), 1.); }`;

@@ -4,17 +4,34 @@
  * ground.
  */
 import {
+  Color,
   type IUniform,
   Matrix4,
   Mesh,
-  MeshLambertMaterial,
   MeshStandardMaterial,
   type Object3D,
   PlaneGeometry,
+  ShaderMaterial,
+  UniformsLib,
+  UniformsUtils,
   type Vector2,
+  type WebGLProgramParametersWithUniforms,
 } from "three";
 import { BACKDROP_GLSL, BACKDROP_Z_M, type BackdropUniforms } from "./backdrop";
+import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
+import { IRRADIANCE_GLSL } from "./irradiance";
 import type { Look } from "./look";
+import { NOISE_GLSL } from "./noise";
+import {
+  updateVignette,
+  VIGNETTE_GLSL,
+  VIGNETTE_VARYING_GLSL,
+  VIGNETTE_VERTEX_GLSL,
+  type VignetteUniforms,
+} from "./vignette";
+
+/** Width and depth in metres. */
+const SIZE_M = [26, 9] as const;
 
 const SHADE_GLSL = /* glsl */ `
 #include <opaque_fragment>
@@ -48,57 +65,138 @@ const HORIZON_GLSL = /* glsl */ `
 if (dark < .5) gl_FragColor.rgb = mix(gl_FragColor.rgb, backdrop(vec2(at.x, -.2), .3), horizon);
 `;
 
+const SIMPLE_VERTEX_GLSL = /* glsl */ `
+#include <common>
+#include <tonemapping_pars_fragment>
+${IRRADIANCE_GLSL}
+${VIGNETTE_VERTEX_GLSL}
+uniform vec3 colour; uniform float ambient; uniform mat4 intoRig; uniform float dark; uniform vec2 travelled;
+varying vec2 vAt, vBoard, vLanding; varying vec3 vWood; varying float vMirror, vHorizon;
+void main() {
+  vec4 place = modelMatrix * vec4(position, 1.);
+  vec4 seen = viewMatrix * place;
+  gl_Position = projectionMatrix * seen;
+  vec3 eye = normalize(mat3(intoRig) * (place.xyz - cameraPosition));
+  vAt = (intoRig * place).xz;
+  vBoard = vAt + travelled;
+  vec3 bounce = vec3(eye.x, -eye.y, eye.z);
+  vLanding = vec2(vAt.x, 0.) + bounce.xy * (${BACKDROP_Z_M.toFixed(2)} - vAt.y) / min(bounce.z, -1e-3);
+  float fresnel = .05 + .95 * pow(1. - abs(eye.y), 5.);
+  vec3 wood = colour * (RECIPROCAL_PI * irradiance(seen.xyz, normalize(normalMatrix * normal)) + ambient) * mix(1., mix(.35, 1., exp(-.28 * dot(vAt, vAt))), dark);
+  // Displayed colours have about the roots of linear ones: their squares add up.
+  vWood = pow(ACESFilmicToneMapping(wood), vec3(2. / 2.2));
+  vMirror = mix(.35 * fresnel, .95 * (.9 * fresnel + .13), dark);
+  vHorizon = mix(
+    max(smoothstep(.5, 2.6, -vAt.y + .15 * abs(vAt.x)), .8 * smoothstep(.9, 3.4, length(vAt))),
+    smoothstep(1.3, ${(0.2 - BACKDROP_Z_M).toFixed(2)}, -vAt.y + .22 * abs(vAt.x)),
+    dark);
+  setVignette();
+}`;
+const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
+uniform float dark;
+varying vec2 vAt, vBoard, vLanding; varying vec3 vWood; varying float vMirror, vHorizon;
+${NOISE_GLSL}
+${BAKED_GLSL}
+${VIGNETTE_VARYING_GLSL}
+void main() {
+  float grain = noise2(vBoard * vec2(2., 26.));
+  float gap = smoothstep(.478, .497, abs(fract(vBoard.x * 1.55) - .5));
+  vec3 mirrored = texture2D(bakedBlurred, bakedPlace(vLanding + vec2((grain - .5) * .03, 0.))).rgb;
+  mirrored *= mirrored;
+  vec3 wood = vWood * (1. + mix(.05, .5, dark) * (grain - .5)) * (1. - mix(.1, .6, dark) * gap);
+  vec3 shown = sqrt(mix(wood * (1. - vMirror), wood * (1. - .4 * gap * vMirror), dark) + vMirror * mirrored);
+  if (vHorizon > 0.)
+    shown = mix(shown, texture2D(bakedBlurred, bakedPlace(vec2(vAt.x, mix(-.2, .02, dark)))).rgb, vHorizon);
+  gl_FragColor = vec4(withVignette(shown), 1.);
+}`;
+
 export interface Floor {
   readonly mesh: Mesh;
+  /** Draws light and reflection from corner to corner of a grid, with a baked backdrop. */
+  usesSimpleMaterials: boolean;
   applyLook(look: Look): void;
   dispose(): void;
 }
 
+/** Uniforms that the floor shares with other parts of the scenery. */
+export interface FloorSurroundings {
+  backdrop: BackdropUniforms;
+  vignette: VignetteUniforms;
+  baked: BakedUniforms;
+}
+
 /**
- * Create the floor. `rig` is the frame that it lies in, `offset` the distance that the rig has travelled, for the
- * boards, and `simple` leaves out the gloss for software rendering.
+ * Create the floor. `rig` is the frame that it lies in, and `offset` the distance that the rig has travelled, for the
+ * boards.
  */
-export function createFloor(backdrop: BackdropUniforms, rig: Object3D, offset: Vector2, simple: boolean): Floor {
-  const material = simple
-    ? new MeshLambertMaterial({ transparent: true })
-    : new MeshStandardMaterial({ transparent: true });
+export function createFloor({ backdrop, vignette, baked }: FloorSurroundings, rig: Object3D, offset: Vector2): Floor {
   const intoRig: IUniform<Matrix4> = { value: new Matrix4() };
   const opacityNear: IUniform<number> = { value: 1 };
-  material.onBeforeCompile = (shader) => {
-    Object.assign(shader.uniforms, backdrop, { travelled: { value: offset }, intoRig, opacityNear });
-    shader.vertexShader = shader.vertexShader
-      .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;")
-      .replace("#include <fog_vertex>", "#include <fog_vertex>\nvPlace = (modelMatrix * vec4(transformed, 1.)).xyz;");
-    shader.fragmentShader = shader.fragmentShader
-      .replace(
-        "#include <common>",
-        `#include <common>
-varying vec3 vPlace; uniform vec2 travelled; uniform mat4 intoRig; uniform float opacityNear;
-${BACKDROP_GLSL}`,
-      )
-      .replace("#include <opaque_fragment>", SHADE_GLSL)
-      .replace("#include <tonemapping_fragment>", HORIZON_GLSL);
-  };
-  const mesh = new Mesh(new PlaneGeometry(26, 9), material);
+  const colour: IUniform<Color> = { value: new Color() };
+  const ambient: IUniform<number> = { value: 0 };
+  const placed = { ...vignette, travelled: { value: offset }, intoRig };
+  const glossy = new MeshStandardMaterial({ transparent: true });
+  glossy.onBeforeCompile = (shader) => patchShader(shader, { ...backdrop, ...placed, opacityNear });
+  const simple = new ShaderMaterial({
+    uniforms: { ...UniformsUtils.clone(UniformsLib.lights), ...placed, ...baked, dark: backdrop.dark, colour, ambient },
+    vertexShader: SIMPLE_VERTEX_GLSL,
+    fragmentShader: SIMPLE_FRAGMENT_GLSL,
+    lights: true,
+    toneMapped: false,
+  });
+  const [plane, grid] = [new PlaneGeometry(...SIZE_M), new PlaneGeometry(...SIZE_M, 52, 18)];
+  const mesh = new Mesh<PlaneGeometry, MeshStandardMaterial | ShaderMaterial>(plane, glossy);
   mesh.name = "floor";
   mesh.rotation.x = -Math.PI / 2;
-  mesh.position.z = BACKDROP_Z_M + 4.5;
+  mesh.position.z = BACKDROP_Z_M + SIZE_M[1] / 2;
   mesh.receiveShadow = true;
   mesh.renderOrder = 2;
-  mesh.onBeforeRender = () => intoRig.value.copy(rig.matrixWorld).invert();
+  const fitVignette = updateVignette(vignette);
+  mesh.onBeforeRender = (...parts) => {
+    fitVignette(...parts);
+    intoRig.value.copy(rig.matrixWorld).invert();
+  };
   return {
     mesh,
-    applyLook(look) {
-      material.color.set(look.floor.colour);
-      if (material instanceof MeshStandardMaterial) {
-        material.roughness = look.floor.roughness;
-        material.envMapIntensity = look.floor.environment;
-      }
-      opacityNear.value = look.floor.opacity;
+    get usesSimpleMaterials() {
+      return mesh.material === simple;
+    },
+    set usesSimpleMaterials(on) {
+      mesh.material = on ? simple : glossy;
+      mesh.geometry = on ? grid : plane;
+    },
+    applyLook({ floor }) {
+      glossy.color.set(floor.colour);
+      colour.value.set(floor.colour);
+      ambient.value = floor.ambient;
+      glossy.roughness = floor.roughness;
+      glossy.envMapIntensity = floor.environment;
+      opacityNear.value = floor.opacity;
     },
     dispose() {
-      mesh.geometry.dispose();
-      material.dispose();
+      for (const part of [plane, grid, glossy, simple]) part.dispose();
     },
   };
+}
+
+/** Add boards, reflection and vignette to the shader of three.js. */
+function patchShader(shader: WebGLProgramParametersWithUniforms, uniforms: Record<string, IUniform>): void {
+  Object.assign(shader.uniforms, uniforms);
+  shader.vertexShader = shader.vertexShader
+    .replace("#include <common>", "#include <common>\nvarying vec3 vPlace;")
+    .replace("#include <fog_vertex>", "#include <fog_vertex>\nvPlace = (modelMatrix * vec4(transformed, 1.)).xyz;");
+  shader.fragmentShader = shader.fragmentShader
+    .replace(
+      "#include <common>",
+      `#include <common>
+varying vec3 vPlace; uniform vec2 travelled; uniform mat4 intoRig; uniform float opacityNear;
+${BACKDROP_GLSL}
+${VIGNETTE_GLSL}`,
+    )
+    .replace("#include <opaque_fragment>", SHADE_GLSL)
+    .replace("#include <tonemapping_fragment>", HORIZON_GLSL)
+    .replace(
+      "#include <colorspace_fragment>",
+      "#include <colorspace_fragment>\ngl_FragColor.rgb = withVignette(gl_FragColor.rgb);",
+    );
 }

@@ -8,7 +8,10 @@ export interface Look {
   environment: number;
   backdrop: { low: string; middle: string; top: string };
   disc: { deep: string; bright: string; strength: number };
-  floor: { colour: string; roughness: number; opacity: number; environment: number };
+  /** Shade of the corners: displayed colour, strength at the end of the ellipse, and where it starts. */
+  vignette: { colour: string; strength: number; start: number };
+  /** `ambient` replaces the light of the environment map where there is none. */
+  floor: { colour: string; roughness: number; opacity: number; environment: number; ambient: number };
   /** Lights: colour and intensity (candela for spots). */
   key: readonly [string, number];
   fill: readonly [string, number];
@@ -30,7 +33,8 @@ export const LOOKS: Readonly<Record<Theme, Look>> = {
     environment: 0.72,
     backdrop: { low: "#0a0b12", middle: "#161c33", top: "#090b16" },
     disc: { deep: "#b27a2e", bright: "#e8b765", strength: 0.76 },
-    floor: { colour: "#1a1411", roughness: 0.42, opacity: 0.84, environment: 0.25 },
+    vignette: { colour: "#03040a", strength: 0.55, start: 0.52 },
+    floor: { colour: "#1a1411", roughness: 0.42, opacity: 0.84, environment: 0.25, ambient: 0.1 },
     key: ["#ffe4c2", 118],
     fill: ["#a9b8ea", 1.04],
     warmRim: ["#ffd9a0", 70],
@@ -47,7 +51,8 @@ export const LOOKS: Readonly<Record<Theme, Look>> = {
     environment: 0.55,
     backdrop: { low: "#e9d9bb", middle: "#f6ecd9", top: "#efe3cc" },
     disc: { deep: "#dcb35c", bright: "#efd08a", strength: 0.92 },
-    floor: { colour: "#d8c19a", roughness: 0.9, opacity: 0.96, environment: 0.3 },
+    vignette: { colour: "#96703c", strength: 0.16, start: 0.6 },
+    floor: { colour: "#d8c19a", roughness: 0.9, opacity: 0.96, environment: 0.3, ambient: 0.75 },
     key: ["#fff0d8", 95],
     fill: ["#c9d6ff", 0.4],
     warmRim: ["#fff4e0", 30],

@@ -5,6 +5,8 @@ import { formatDuration } from "../format";
 import { bufferedTo, type SeekCell, seekCells } from "./seek-cell";
 
 const QUALITY_NAMES = ["lowest detail", "low detail", "good detail", "full detail"] as const;
+/** Positions that the head can take: about one per pixel. */
+const HEAD_STEPS = 1000;
 const MAX_CELLS = { desktop: 68, phone: 44 };
 
 export interface SeekBar {
@@ -29,6 +31,7 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
   let blockLevels: ArrayLike<number> = [];
   let [position, length] = [0, 0];
   let shownQualities = "";
+  let shownHeadPlace = 0;
 
   const secondsAt = (event: PointerEvent) => {
     const box = bar.getBoundingClientRect();
@@ -99,8 +102,10 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
     setPosition(seconds, duration) {
       const moved = Math.floor(seconds * 4) !== Math.floor(position * 4) || duration !== length;
       [position, length] = [seconds, duration];
-      head.hidden = duration <= 0;
-      head.style.left = `${duration > 0 ? (seconds / duration) * 100 : 0}%`;
+      if (head.hidden !== duration <= 0) head.hidden = duration <= 0;
+      const headPlace = duration > 0 ? Math.round((seconds / duration) * HEAD_STEPS) / HEAD_STEPS : 0;
+      if (headPlace !== shownHeadPlace) head.style.transform = `translateX(${100 * headPlace}%)`;
+      shownHeadPlace = headPlace;
       if (!moved) return;
       markPlayed();
       setAttribute(bar, "aria-valuemax", Math.round(duration));

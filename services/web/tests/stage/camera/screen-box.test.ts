@@ -1,6 +1,6 @@
 import { PerspectiveCamera, Vector3 } from "three";
 import { expect, test } from "vitest";
-import { overlaps, projectBox } from "../../../src/stage/camera/screen-box";
+import { overlaps, projectBox, unionOf } from "../../../src/stage/camera/screen-box";
 
 test("a box has the size on the screen that its extent has at its depth", () => {
   const camera = new PerspectiveCamera(90, 2, 0.1, 100);
@@ -20,4 +20,12 @@ test("boxes overlap if they share area, or would with a margin", () => {
   expect([overlaps(box, beside), overlaps(beside, box)]).toEqual([false, false]);
   expect([overlaps(box, beside, 1), overlaps(beside, box, 1)]).toEqual([true, true]);
   expect([overlaps(box, below, 3), overlaps(box, below, 4)]).toEqual([false, true]);
+});
+
+test("the union of boxes contains them all", () => {
+  const boxes = [
+    { left: 1, top: 5, right: 3, bottom: 6 },
+    { left: 2, top: 2, right: 9, bottom: 4 },
+  ];
+  expect(unionOf(boxes)).toEqual({ left: 1, top: 2, right: 9, bottom: 6 });
 });

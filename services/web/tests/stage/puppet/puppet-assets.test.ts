@@ -4,12 +4,19 @@ import { BONES, buildPuppetGeometry, PuppetAssets } from "../../../src/stage/pup
 import { createOtherFigure, createStandardFigure } from "./figures";
 
 describe("the puppet's geometry", () => {
-  const geometry = buildPuppetGeometry(createOtherFigure());
+  const { detailed: geometry, coarse } = buildPuppetGeometry(createOtherFigure());
   const values = (name: string) => geometry.getAttribute(name).array;
 
   test("stays within the budget of 30,000 triangles", () => {
     expect((geometry.index?.count ?? 0) / 3).toBeLessThan(30_000);
     expect((geometry.index?.count ?? 0) / 3).toBeGreaterThan(20_000);
+  });
+
+  test("has a coarse mesh of the same vertices with a third of the triangles", () => {
+    for (const name of Object.keys(geometry.attributes))
+      expect(coarse.getAttribute(name)).toBe(geometry.getAttribute(name));
+    expect((coarse.index?.count ?? 0) / (geometry.index?.count ?? 0)).toBeLessThan(0.36);
+    expect((coarse.index?.count ?? 0) / (geometry.index?.count ?? 0)).toBeGreaterThan(0.2);
   });
 
   test("has finite positions, unit normals and weights that sum to one", () => {
@@ -36,7 +43,7 @@ test("figures of equal lengths share a mesh, which is disposed of after use", ()
   const other = assets.geometryFor(createOtherFigure());
   expect(other).not.toBe(shape);
   const disposed: unknown[] = [];
-  for (const one of [shape, other]) one.addEventListener("dispose", () => disposed.push(one));
+  for (const one of [shape, other]) one.detailed.addEventListener("dispose", () => disposed.push(one));
   assets.retainOnly([createStandardFigure()]);
   expect(disposed).toEqual([other]);
   expect(assets.geometryFor(createStandardFigure())).toBe(shape);

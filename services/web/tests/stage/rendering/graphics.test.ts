@@ -37,7 +37,7 @@ test("a graphics processor gets antialiasing, and the probe context is lost", ()
   expect(lost()).toBe(1);
 });
 
-test("software rendering gets no antialiasing unless quality is pinned", () => {
+test("software rendering gets no antialiasing of the context unless quality is pinned", () => {
   const { canvas, requested } = canvasOf("Google SwiftShader");
   expect(openGraphics(canvas).quality.quality.simpleMaterials).toBe(true);
   expect(openGraphics(canvas, true).quality.quality.simpleMaterials).toBe(false);

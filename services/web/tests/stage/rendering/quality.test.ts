@@ -1,90 +1,114 @@
 import { expect, test } from "vitest";
-import { AdaptiveQuality, QUALITY_LEVELS } from "../../../src/stage/rendering/quality";
+import { AdaptiveQuality, BEST_QUALITY, GRAPHICS_LEVELS, SOFTWARE_LEVELS } from "../../../src/stage/rendering/quality";
 
+const SOFTWARE = "ANGLE (Google, Vulkan 1.3 (SwiftShader Device))";
+const WORST = GRAPHICS_LEVELS.length - 1;
+
+/** Draw frames that take this time; return the level. */
 function run(choice: AdaptiveQuality, seconds: number, frames: number): number {
   for (let i = 0; i < frames; i++) choice.addFrameTime(seconds);
-  return QUALITY_LEVELS.indexOf(choice.quality);
+  return GRAPHICS_LEVELS.indexOf(choice.quality);
 }
-
-test("fast frames keep the best quality, slow frames reduce it to the last", () => {
-  expect(run(new AdaptiveQuality("", false), 1 / 60, 1000)).toBe(0);
-  expect(run(new AdaptiveQuality("", false), 1 / 15, 9)).toBe(1);
-  expect(run(new AdaptiveQuality("", false), 1 / 15, 1000)).toBe(QUALITY_LEVELS.length - 1);
-  expect(run(new AdaptiveQuality("", false), 1.5, 5)).toBe(2);
-});
 
 /** Frame time of a machine that draws the level in this time, on a display with 60 Hz. */
 function displayed(cost: number): number {
   return Math.ceil(cost * 60 - 1e-6) / 60;
 }
 
-/** Draw for `seconds` on a machine that needs `costs[level]` seconds a frame; return the levels in the order of change. */
-function drawFor(choice: AdaptiveQuality, seconds: number, costs: readonly number[]): number[] {
+/** Draw for `seconds` on a machine that needs `cost(level)` seconds a frame; return the levels in the order of change. */
+function drawFor(choice: AdaptiveQuality, seconds: number, cost: (level: number) => number): number[] {
   const levels: number[] = [];
   for (let passed = 0; passed < seconds; ) {
-    const frame = displayed(costs[QUALITY_LEVELS.indexOf(choice.quality)]);
+    const frame = displayed(cost(GRAPHICS_LEVELS.indexOf(choice.quality)));
     passed += frame;
-    if (choice.addFrameTime(frame)) levels.push(QUALITY_LEVELS.indexOf(choice.quality));
+    if (choice.addFrameTime(frame, 1 / 60)) levels.push(GRAPHICS_LEVELS.indexOf(choice.quality));
   }
   return levels;
 }
 
-const FAST = [0.005, 0.005, 0.005, 0.005, 0.005];
+const always = (seconds: number) => () => seconds;
 
-test("after a slow moment the quality returns to the best in less than a minute", () => {
+test("levels get cheaper in small steps, and never below 0.6 of the resolution", () => {
+  for (const levels of [GRAPHICS_LEVELS, SOFTWARE_LEVELS])
+    levels.forEach(({ pixelRatioScale, ...details }, at) => {
+      expect(pixelRatioScale).toBeGreaterThanOrEqual(0.6);
+      const { pixelRatioScale: before, ...detailsBefore } = levels[Math.max(0, at - 1)];
+      expect(before - pixelRatioScale).toBeLessThanOrEqual(0.11);
+      if (JSON.stringify(details) === JSON.stringify(detailsBefore))
+        expect(pixelRatioScale).toBeLessThanOrEqual(before);
+    });
+});
+
+test("fast frames keep the best quality, slow frames reduce it to the last", () => {
+  expect(run(new AdaptiveQuality("", false), 1 / 60, 1000)).toBe(0);
+  expect(run(new AdaptiveQuality("", false), 1 / 40, 9)).toBe(1);
+  expect(run(new AdaptiveQuality("", false), 1 / 25, 9)).toBe(2);
+  expect(run(new AdaptiveQuality("", false), 1 / 15, 1000)).toBe(WORST);
+});
+
+test("a display that is slow is no reason to reduce the quality", () => {
   const choice = new AdaptiveQuality("", false);
-  drawFor(choice, 10, [0.2, 0.2, 0.2, 0.2, 0.2]);
-  expect(QUALITY_LEVELS.indexOf(choice.quality)).toBe(4);
-  expect(drawFor(choice, 60, FAST)).toEqual([3, 2, 1, 0]);
+  for (let i = 0; i < 1000; i++) choice.addFrameTime(1 / 30, 1 / 30);
+  expect(choice.quality).toBe(BEST_QUALITY);
+  for (let i = 0; i < 9; i++) choice.addFrameTime(1 / 15, 1 / 30);
+  expect(choice.quality).not.toBe(BEST_QUALITY);
+});
+
+test("after a slow moment the quality returns to the best in a minute", () => {
+  const choice = new AdaptiveQuality("", false);
+  drawFor(choice, 10, always(0.2));
+  expect(GRAPHICS_LEVELS.indexOf(choice.quality)).toBe(WORST);
+  expect(drawFor(choice, 60, always(0.005))).toEqual(Array.from({ length: WORST }, (_, at) => WORST - 1 - at));
 });
 
 test("a level that is too slow is tried ever more rarely", () => {
   const choice = new AdaptiveQuality("", false);
-  const costs = [0.08, 0.06, 0.012, 0.008, 0.004];
-  drawFor(choice, 10, costs);
-  expect(QUALITY_LEVELS.indexOf(choice.quality)).toBe(2);
-  const tried = drawFor(choice, 600, costs);
-  expect(tried.length).toBeLessThanOrEqual(12);
+  const cost = (level: number) => (level < 2 ? 0.03 : 0.012);
+  drawFor(choice, 10, cost);
+  expect(GRAPHICS_LEVELS.indexOf(choice.quality)).toBe(2);
+  const tried = drawFor(choice, 600, cost);
+  expect(tried.length).toBeLessThanOrEqual(14);
   expect(new Set(tried)).toEqual(new Set([1, 2]));
   // From now on there is at most one trial in five minutes.
-  expect(drawFor(choice, 300, costs).length).toBeLessThanOrEqual(2);
+  expect(drawFor(choice, 300, cost).length).toBeLessThanOrEqual(2);
 });
 
 test("a level between slow and fast is neither reduced nor raised", () => {
   const choice = new AdaptiveQuality("", false);
-  run(choice, 1 / 15, 9);
-  expect(run(choice, 1 / 25, 5000)).toBe(1);
+  run(choice, 1 / 40, 9);
+  expect(run(choice, 1.2 / 60, 5000)).toBe(1);
 });
 
 test("a machine that becomes slow for ever after a trial has passed is reduced again", () => {
   const choice = new AdaptiveQuality("", false);
-  drawFor(choice, 10, [0.2, 0.2, 0.2, 0.2, 0.2]);
-  drawFor(choice, 60, FAST);
-  expect(drawFor(choice, 60, [0.1, 0.1, 0.1, 0.1, 0.01]).at(-1)).toBe(4);
+  drawFor(choice, 10, always(0.2));
+  drawFor(choice, 60, always(0.005));
+  expect(drawFor(choice, 60, always(0.1)).at(-1)).toBe(WORST);
 });
 
-test("software rendering never gets materials that it cannot draw", () => {
-  const choice = new AdaptiveQuality("SwiftShader", false);
-  drawFor(choice, 5, [1, 1, 1, 1, 1]);
-  drawFor(choice, 300, FAST);
-  expect(QUALITY_LEVELS.indexOf(choice.quality)).toBe(3);
+test("software rendering aims at 30 frames a second, and never gets materials that it cannot draw", () => {
+  const choice = new AdaptiveQuality(SOFTWARE, false);
+  for (let i = 0; i < 1000; i++) choice.addFrameTime(1.2 / 30);
+  expect(choice.quality.pixelRatioScale).toBe(0.75);
+  for (let i = 0; i < 100; i++) choice.addFrameTime(1);
+  expect(choice.quality).toBe(SOFTWARE_LEVELS.at(-1));
+  for (let i = 0; i < 5000; i++) choice.addFrameTime(1 / 60);
+  expect(choice.quality).toBe(SOFTWARE_LEVELS[0]);
+  expect(choice.bestQuality).toBe(SOFTWARE_LEVELS[0]);
+  expect(choice.bestQuality.simpleMaterials).toBe(true);
 });
 
 test("a single stutter and a page in the background do not count", () => {
   const choice = new AdaptiveQuality("", false);
   for (let i = 0; i < 200; i++) choice.addFrameTime(i % 10 === 0 ? 0.2 : 1 / 60);
   choice.addFrameTime(600);
-  expect(QUALITY_LEVELS.indexOf(choice.quality)).toBe(0);
+  expect(choice.quality).toBe(BEST_QUALITY);
 });
 
 test("a software renderer starts lower unless quality is pinned", () => {
-  expect(new AdaptiveQuality("ANGLE (Google, Vulkan 1.3 (SwiftShader Device))", false).quality.simpleMaterials).toBe(
-    true,
-  );
-  expect(new AdaptiveQuality("ANGLE (Google, Vulkan 1.3 (SwiftShader Device))", true).quality.simpleMaterials).toBe(
-    false,
-  );
-  expect(new AdaptiveQuality("ANGLE (Apple M2)", false).quality.simpleMaterials).toBe(false);
+  expect(new AdaptiveQuality(SOFTWARE, false).quality.simpleMaterials).toBe(true);
+  expect(new AdaptiveQuality(SOFTWARE, true).quality).toBe(BEST_QUALITY);
+  expect(new AdaptiveQuality("ANGLE (Apple M2)", false).quality).toBe(BEST_QUALITY);
 });
 
 test("frames after a restart are not measured, since shaders are compiled", () => {
@@ -92,5 +116,5 @@ test("frames after a restart are not measured, since shaders are compiled", () =
   run(choice, 1 / 60, 100);
   choice.restart();
   expect(run(choice, 2, 3)).toBe(0);
-  expect(run(choice, 2, 1)).toBe(2);
+  expect(run(choice, 2, 1)).toBe(4);
 });

@@ -1,0 +1,73 @@
+/** What is drawn, and when: without a graphics processor each frame counts, and on a phone each one costs battery. */
+import { expect, test } from "vitest";
+import { describeInBrowser } from "./browser-suite";
+import { LEFT_HAND, pauseAtStart, ringPosition, waitForFirstPose } from "./page-probe";
+
+/** Callbacks without a frame after which a stage counts as still. */
+const STILL_CALLBACKS = 15;
+
+describeInBrowser("drawing", { server: "open" }, ({ open }) => {
+  test("a paused stage is drawn in the best quality, then only when something moves", async () => {
+    const page = await open("", { colorScheme: "dark" });
+    await waitForFirstPose(page);
+    await pauseAtStart(page);
+    await page.waitForFunction(() => {
+      const { domElement } = window.bunraku.stage.renderer;
+      return domElement.width === domElement.clientWidth;
+    });
+    await page.waitForFunction((callbacks) => {
+      const { renderer } = window.bunraku.stage;
+      return new Promise<boolean>((resolve) => {
+        const { frame } = renderer.info.render;
+        let left = callbacks;
+        const step = () => {
+          if (renderer.info.render.frame !== frame) resolve(false);
+          else if (--left > 0) requestAnimationFrame(step);
+          else resolve(true);
+        };
+        requestAnimationFrame(step);
+      });
+    }, STILL_CALLBACKS);
+    const frame = await page.evaluate(() => window.bunraku.stage.renderer.info.render.frame);
+    const ring = await ringPosition(page, LEFT_HAND);
+    await page.mouse.move(ring.x, ring.y);
+    await page.waitForFunction((frame) => window.bunraku.stage.renderer.info.render.frame > frame, frame);
+  });
+
+  test("edges are smooth without a graphics processor", async () => {
+    const page = await open("", { colorScheme: "dark" });
+    await waitForFirstPose(page);
+    const { smoothed, unsmoothed } = await page.evaluate(async () => {
+      const { stage } = window.bunraku;
+      const { renderer, scene, audience } = stage;
+      const canvas = renderer.domElement;
+      /** Count neighbours in a row whose luma differs by more than a third of the range. */
+      const countJumps = () => {
+        const context = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d")!;
+        context.drawImage(canvas, 0, 0);
+        const { data, width } = context.getImageData(0, 0, canvas.width, canvas.height);
+        const luma = (pixel: number) =>
+          0.299 * data[4 * pixel] + 0.587 * data[4 * pixel + 1] + 0.114 * data[4 * pixel + 2];
+        let jumps = 0;
+        for (let pixel = 1; pixel < data.length / 4; pixel++)
+          if (pixel % width > 0 && Math.abs(luma(pixel) - luma(pixel - 1)) > 85) jumps++;
+        return jumps;
+      };
+      // A canvas shows its frame only until the end of the task that drew it.
+      return new Promise<{ smoothed: number; unsmoothed: number }>((resolve) => {
+        const draw = stage.draw.bind(stage);
+        stage.draw = (...state) => {
+          const { frame } = renderer.info.render;
+          draw(...state);
+          if (renderer.info.render.frame === frame) return;
+          stage.draw = draw;
+          const smoothed = countJumps();
+          renderer.render(scene, audience.camera);
+          resolve({ smoothed, unsmoothed: countJumps() });
+        };
+      });
+    });
+    expect(unsmoothed).toBeGreaterThan(50);
+    expect(smoothed / unsmoothed).toBeLessThan(0.7);
+  });
+});
