@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 import inspect
+import logging
 import os
 import tempfile
 import zlib
@@ -104,6 +105,31 @@ def _own_temporary_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         patch.setenv("TMPDIR", folder)
         patch.setattr(tempfile, "tempdir", folder)
         yield
+
+
+class _UncaughtExceptions(logging.Handler):
+    """Handler that keeps what the event loop reports: exceptions that nothing catches."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.ERROR)
+        self.reports: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.reports.append(self.format(record))
+
+
+@pytest.fixture(autouse=True)
+def _no_uncaught_exception() -> Iterator[None]:
+    """Fail a test in which only the event loop caught an exception, of a callback, a protocol or a task.
+
+    Clients see nothing of most of them.
+    """
+    handler = _UncaughtExceptions()
+    logger = logging.getLogger("asyncio")
+    logger.addHandler(handler)
+    yield
+    logger.removeHandler(handler)
+    assert not handler.reports, "\n".join(handler.reports)
 
 
 @pytest.fixture(scope="session")

@@ -175,6 +175,33 @@ async def test_rejected_client_gets_the_reason_however_much_it_sends() -> None:
         await ended.wait()
 
 
+MALFORMED_LINES = {
+    "body": b"Content-Length: 5",
+    "coding": b"Transfer-Encoding: chunked",
+    "many headers": b"\r\n".join([b"a: b"] * 200),
+    "large header": b"a: " + b"b" * 9_000,
+    "second key": b"Sec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==",
+    "second version": b"Sec-WebSocket-Version: 8",
+    "no header": b"abc",
+    "NUL": b"a: b\0c",
+}
+
+
+@pytest.mark.parametrize("line", MALFORMED_LINES.values(), ids=MALFORMED_LINES)
+async def test_malformed_handshake_is_answered_and_closed(line: bytes) -> None:
+    async def endpoint(ws: WebSocket) -> None:
+        await ws.accept()
+        await ws.close()
+
+    async with serve_app(endpoint) as (url, _):
+        parts = urlsplit(url)
+        reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
+        writer.write(upgrade_request(url)[:-2] + line + b"\r\n\r\n")
+        with contextlib.suppress(ConnectionError):
+            assert (await reader.read()).startswith((b"HTTP/1.1 400", b"HTTP/1.1 101", b"HTTP/1.1 403"))
+        writer.close()
+
+
 async def test_handshake_that_is_not_answered_is_aborted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(handoff, "HANDSHAKE_TIMEOUT_S", 0.1)
     ended = asyncio.Event()

@@ -120,8 +120,10 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
 
     def _withdraw_extension(self) -> None:
         """Remove the reference from the scope to this object, so that both are freed at once."""
-        if self.scope is not None and self.scope["extensions"] is not None:
-            self.scope["extensions"].pop(HANDOFF_EXTENSION, None)
+        # a rejected handshake has no scope
+        extensions = getattr(self, "scope", {}).get("extensions")
+        if extensions is not None:
+            extensions.pop(HANDOFF_EXTENSION, None)
 
     def _cancel_timeout(self) -> None:
         if self._handshake_timer is not None:
