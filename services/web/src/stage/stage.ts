@@ -16,15 +16,10 @@ import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group"
 import { FrameRenderer } from "./rendering/frame-renderer";
 import { type Graphics, openGraphics } from "./rendering/graphics";
 import { BEST_QUALITY, type Quality } from "./rendering/quality";
-import { applyLookToBackdrop, createBackdrop, createBackdropUniforms } from "./scenery/backdrop";
-import { BakedBackdrop } from "./scenery/baked-backdrop";
-import { createBakedUniforms } from "./scenery/baked-uniforms";
 import { createEnvironmentMap } from "./scenery/environment-map";
-import { createFloor, type Floor } from "./scenery/floor";
 import { createLights } from "./scenery/lighting";
 import { LOOKS, type Look, type Theme } from "./scenery/look";
 import { Scenery } from "./scenery/scenery";
-import { applyLookToVignette, createVignetteUniforms } from "./scenery/vignette";
 import { type StringState, Strings } from "./strings/strings";
 
 /** Limits of the pixel ratio: higher ones cost more than they show. */
@@ -33,16 +28,8 @@ const MAX_PIXEL_RATIO = { desktop: 2, phone: 1.75 };
 const HEADROOM_PX = 120;
 const HEADROOM_SHARE = 0.2;
 
-/** Extents of a control bar and a face on the standard figure. */
+/** Extent of a control bar on the standard figure. */
 const BAR_EXTENT: WorldExtent = { across: 0.17, up: 0.07, down: 0.05 };
-const FACE_EXTENT: WorldExtent = { across: 0.1, up: 0.16, down: 0.14 };
-
-/** Joints that span a figure, and how far its clothes and hair reach beyond them on the standard figure. */
-const OUTER_JOINTS = [
-  "skullbase",
-  ...["l", "r"].flatMap((side) => [`${side}_elbow`, `${side}_wrist`, `${side}_knee`, `${side}_ankle`]),
-];
-const EDGE_EXTENT: WorldExtent = { across: 0.3, up: 0.3, down: 0.3 };
 
 /** Half the width that the lights cover for one performer, in metres. */
 const LIT_HALF_WIDTH_M = 1.2;
@@ -66,13 +53,7 @@ export class Stage {
   /** Performer that this page's inputs act on, which a narrow picture frames; null frames all. */
   selectedPerformer: number | null = null;
   readonly #performerGroup: PerformerGroup;
-  readonly #scenery = new Scenery();
-  readonly #backdropUniforms = createBackdropUniforms();
-  readonly #vignette = createVignetteUniforms();
-  readonly #baked = createBakedUniforms();
-  readonly #backdrop = createBackdrop(this.#backdropUniforms, this.#vignette, this.#baked);
-  readonly #bakedBackdrop = new BakedBackdrop(this.#backdropUniforms, this.#baked);
-  readonly #floor: Floor;
+  readonly #scenery = new Scenery(this.rig.floorOffset);
   readonly #lights = createLights();
   readonly #floorHeight: IUniform<number> = { value: 0 };
   readonly #projection = new ScreenProjection(this.audience.camera);
@@ -91,9 +72,6 @@ export class Stage {
   constructor(canvas: HTMLCanvasElement, graphics: Graphics = openGraphics(canvas)) {
     this.#frameRenderer = new FrameRenderer(canvas, graphics);
     this.renderer = this.#frameRenderer.renderer;
-    const surroundings = { backdrop: this.#backdropUniforms, vignette: this.#vignette, baked: this.#baked };
-    this.#floor = createFloor(surroundings, this.#scenery.group, this.rig.floorOffset);
-    this.#scenery.group.add(this.#backdrop.mesh, this.#floor.mesh);
     this.#performerGroup = new PerformerGroup(this.#floorHeight);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#performerGroup.group);
@@ -155,10 +133,7 @@ export class Stage {
     if (theme === this.#theme) return;
     this.#theme = theme;
     this.#look = LOOKS[theme];
-    applyLookToBackdrop(this.#backdropUniforms, this.#look);
-    applyLookToVignette(this.#vignette, this.#look);
-    this.#bakedBackdrop.invalidate();
-    this.#floor.applyLook(this.#look);
+    this.#scenery.applyLook(this.#look);
     this.#lights.applyLook(this.#look);
     this.#updateEnvironment();
     this.renderer.toneMappingExposure = this.#look.exposure;
@@ -263,7 +238,7 @@ export class Stage {
     if (hasPose && this.#firstFrame === "pending") this.#firstFrame = "submitted";
     if (this.#firstFrame !== "submitted") this.#addScenery();
     if (this.#frameRenderer.quality !== this.#appliedQuality) this.#applyQuality();
-    if (this.#backdrop.usesSimpleMaterials && this.#scenery.group.parent) this.#bakedBackdrop.update(this.renderer);
+    this.#scenery.prepare(this.renderer);
     this.#frameRenderer.draw(this.scene, audience.camera, hasPose ? this.#edgeBox : null);
     this.#drawnHandles = this.#performerGroup.handles.map((at) => at && this.toScreen(at));
   }
@@ -271,7 +246,7 @@ export class Stage {
   /** Release all graphics resources; the stage cannot draw afterwards. */
   dispose(): void {
     this.#performerGroup.dispose();
-    for (const part of [this.#backdrop, this.#bakedBackdrop, this.#floor]) part.dispose();
+    this.#scenery.dispose();
     this.scene.environment?.dispose();
     this.#frameRenderer.dispose();
   }
@@ -301,13 +276,7 @@ export class Stage {
 
   /** Boxes of the faces on the screen, in CSS pixels. */
   get faceBoxes(): ScreenBox[] {
-    return this.#performerGroup.visiblePerformers.map((performer) =>
-      this.#projection.boxAt(
-        new Vector3().setFromMatrixPosition(performer.joint("skullbase")),
-        FACE_EXTENT,
-        this.audience.scale,
-      ),
-    );
+    return this.#performerGroup.faceBoxes(this.#projection, this.audience.scale);
   }
 
   /**
@@ -342,14 +311,10 @@ export class Stage {
 
   /** Box around all performers and control bars in the picture, in CSS pixels. */
   get #edgeBox(): ScreenBox {
-    const at = new Vector3();
-    const boxes = this.#performerGroup.visiblePerformers.flatMap(({ joint, scale }) =>
-      OUTER_JOINTS.map((name) => this.#projection.boxAt(at.setFromMatrixPosition(joint(name)), EDGE_EXTENT, scale)),
-    );
     const bars = this.performers.flatMap((_, performer) =>
       LIMBS.map((_, limb) => this.barBox(limbNumber(performer, limb))).filter((box) => box !== null),
     );
-    return unionOf([...boxes, ...bars]);
+    return unionOf([...this.#performerGroup.boxes(this.#projection), ...bars]);
   }
 
   #addScenery(): void {
@@ -391,9 +356,7 @@ export class Stage {
   /** The disc keeps its proportion to the performer. */
   #placeDisc(): void {
     const [radius, height] = this.#framing === "phone" || this.#framing === "sheet" ? [0.98, 1.36] : [1.06, 1.3];
-    this.#backdropUniforms.discRadius.value = radius * this.audience.scale;
-    this.#backdropUniforms.discCentre.value.set(0, height * this.audience.scale);
-    this.#bakedBackdrop.invalidate();
+    this.#scenery.placeDisc(radius * this.audience.scale, height * this.audience.scale);
   }
 
   #updateEnvironment(): void {
@@ -406,7 +369,7 @@ export class Stage {
   /** Restore what three.js does not: it uploads resources again, but does not render textures again. */
   #onContextRestored(): void {
     this.#updateEnvironment();
-    this.#bakedBackdrop.invalidate();
+    this.#scenery.invalidate();
     this.#frameRenderer.reset();
   }
 
@@ -418,7 +381,7 @@ export class Stage {
     // Simple materials need no environment; a look that was chosen meanwhile has made none.
     if (!simpleMaterials && this.scene.environment === null) this.#updateEnvironment();
     this.#performerGroup.setQuality(this.#look.dark && reflection, simpleMaterials);
-    this.#backdrop.usesSimpleMaterials = this.#floor.usesSimpleMaterials = simpleMaterials;
+    this.#scenery.usesSimpleMaterials = simpleMaterials;
   }
 
   #handReach(performers: readonly Performer[]): number {

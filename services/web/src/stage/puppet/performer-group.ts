@@ -1,6 +1,8 @@
 /** Performers on the stage: a puppet, or an avatar in its place, for each performer of the motion. */
 import { Group, type IUniform, Vector3 } from "three";
 import { type Figure, LIMBS, type Pose } from "../../motion/skeleton";
+import type { ScreenBox, WorldExtent } from "../camera/screen-box";
+import type { ScreenProjection } from "../camera/screen-projection";
 import type { Performer } from "./performer";
 import { Puppet } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
@@ -8,6 +10,17 @@ import { createAsanohaTexture, createFaceTexture } from "./texture";
 
 /** Creates a performer for the limb lengths that the stream describes. */
 export type PerformerFactory = (figure: Figure) => Performer;
+
+/** Joints that span a figure, and how far its clothes and hair reach beyond them on the standard figure. */
+const OUTER_JOINTS = [
+  "skullbase",
+  ...["l", "r"].flatMap((side) => [`${side}_elbow`, `${side}_wrist`, `${side}_knee`, `${side}_ankle`]),
+];
+const CLOTHES_EXTENT: WorldExtent = { across: 0.3, up: 0.3, down: 0.3 };
+/** Extent of a face on the standard figure. */
+const FACE_EXTENT: WorldExtent = { across: 0.1, up: 0.16, down: 0.14 };
+
+const at = new Vector3();
 
 export class PerformerGroup {
   readonly group = new Group();
@@ -37,6 +50,20 @@ export class PerformerGroup {
   get handles(): (Vector3 | null)[] {
     return this.#performers.flatMap((performer) =>
       LIMBS.map((_, limb) => (performer.group.visible ? performer.handle(limb, new Vector3()) : null)),
+    );
+  }
+
+  /** Return boxes that contain the visible performers in the picture, in CSS pixels. */
+  boxes(projection: ScreenProjection): ScreenBox[] {
+    return this.visiblePerformers.flatMap(({ joint, scale }) =>
+      OUTER_JOINTS.map((name) => projection.boxAt(at.setFromMatrixPosition(joint(name)), CLOTHES_EXTENT, scale)),
+    );
+  }
+
+  /** Return the boxes of the visible performers' faces in the picture, in CSS pixels. */
+  faceBoxes(projection: ScreenProjection, scale: number): ScreenBox[] {
+    return this.visiblePerformers.map(({ joint }) =>
+      projection.boxAt(at.setFromMatrixPosition(joint("skullbase")), FACE_EXTENT, scale),
     );
   }
 

@@ -36,6 +36,11 @@ const FIRST_SOFTWARE_LEVEL = 3;
 /** Frame times that are aimed at, in seconds. */
 const GRAPHICS_TARGET_S = 1 / 60;
 const SOFTWARE_TARGET_S = 1 / 30;
+/**
+ * Interval of the slowest displays, in seconds: browsers that save energy draw 30 frames per second. A longer one is the
+ * machine's.
+ */
+const SLOWEST_DISPLAY_S = 1 / 30;
 /** The quality is reduced if the median frame takes longer than this multiple of the target. */
 const SLOW = 1.25;
 /** The quality may rise if the median frame takes less than this multiple of the target. */
@@ -116,7 +121,7 @@ export class AdaptiveQuality {
     const windowS = sorted.reduce((sum, time) => sum + time, 0);
     this.#frameTimes.length = 0;
     const median = seconds < VERY_SLOW_FRAME_S ? sorted[WINDOW_FRAMES >> 1] : seconds;
-    const targetS = Math.max(this.#targetS, displayS);
+    const targetS = Math.max(this.#targetS, Math.min(displayS, SLOWEST_DISPLAY_S));
     if (median > SLOW * targetS) return this.#reduce(median / targetS);
     if (median < FAST * targetS) this.#fastS += windowS;
     return this.#raise();

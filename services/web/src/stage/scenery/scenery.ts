@@ -1,9 +1,15 @@
 /**
- * Group behind the performers that turns with a camera that circles the stage, since it has no back side. In the
+ * Scenery: backdrop and floor. It turns with a camera that circles the stage, since it has no back side; in the
  * audience view it does not turn.
  */
-import { Group, Vector3 } from "three";
+import { Group, Vector2, Vector3, type WebGLRenderer } from "three";
 import type { CameraView } from "../camera/view";
+import { applyLookToBackdrop, createBackdrop, createBackdropUniforms } from "./backdrop";
+import { BakedBackdrop } from "./baked-backdrop";
+import { createBakedUniforms } from "./baked-uniforms";
+import { createFloor, type Floor } from "./floor";
+import type { Look } from "./look";
+import { applyLookToVignette, createVignetteUniforms } from "./vignette";
 
 /**
  * Angle of view to the side up to which nothing turns, in radians: slightly more than the orbit of the audience view.
@@ -17,9 +23,52 @@ const gaze = new Vector3();
 
 export class Scenery {
   readonly group = new Group();
+  readonly #backdropUniforms = createBackdropUniforms();
+  readonly #vignette = createVignetteUniforms();
+  readonly #baked = createBakedUniforms();
+  readonly #backdrop = createBackdrop(this.#backdropUniforms, this.#vignette, this.#baked);
+  readonly #bakedBackdrop = new BakedBackdrop(this.#backdropUniforms, this.#baked);
+  readonly #floor: Floor;
 
-  constructor() {
+  /** `floorOffset` is the distance that the stage has travelled, which the boards show. */
+  constructor(floorOffset = new Vector2()) {
     this.group.name = "scenery";
+    const surroundings = { backdrop: this.#backdropUniforms, vignette: this.#vignette, baked: this.#baked };
+    this.#floor = createFloor(surroundings, this.group, floorOffset);
+    this.group.add(this.#backdrop.mesh, this.#floor.mesh);
+  }
+
+  /** Draws with materials for machines without a graphics processor. */
+  set usesSimpleMaterials(on: boolean) {
+    this.#backdrop.usesSimpleMaterials = this.#floor.usesSimpleMaterials = on;
+  }
+
+  applyLook(look: Look): void {
+    applyLookToBackdrop(this.#backdropUniforms, look);
+    applyLookToVignette(this.#vignette, look);
+    this.#floor.applyLook(look);
+    this.invalidate();
+  }
+
+  /** Set the disc's radius and the height of its centre, in metres. */
+  placeDisc(radius: number, height: number): void {
+    this.#backdropUniforms.discRadius.value = radius;
+    this.#backdropUniforms.discCentre.value.set(0, height);
+    this.invalidate();
+  }
+
+  /** Draw textures again before the next frame that needs them. */
+  invalidate(): void {
+    this.#bakedBackdrop.invalidate();
+  }
+
+  /** Draw the textures that the next frame needs. */
+  prepare(renderer: WebGLRenderer): void {
+    if (this.group.parent && this.#backdrop.usesSimpleMaterials) this.#bakedBackdrop.update(renderer);
+  }
+
+  dispose(): void {
+    for (const part of [this.#backdrop, this.#bakedBackdrop, this.#floor]) part.dispose();
   }
 
   /** Advance by `seconds`. */

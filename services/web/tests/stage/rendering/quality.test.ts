@@ -50,7 +50,8 @@ test("a display that is slow is no reason to reduce the quality", () => {
   const choice = new AdaptiveQuality("", false);
   for (let i = 0; i < 1000; i++) choice.addFrameTime(1 / 30, 1 / 30);
   expect(choice.quality).toBe(BEST_QUALITY);
-  for (let i = 0; i < 9; i++) choice.addFrameTime(1 / 15, 1 / 30);
+  // A browser that waits for each frame shows no interval but the machine's.
+  for (let i = 0; i < 9; i++) choice.addFrameTime(1 / 15, 1 / 15);
   expect(choice.quality).not.toBe(BEST_QUALITY);
 });
 
