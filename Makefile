@@ -64,7 +64,8 @@ help:
 
 setup: .setup/python .setup/page .setup/warm
 
-demo: setup
+# the kernels are compiled while the demo runs
+demo: .setup/python .setup/page
 	@exec $(BIN)/bunraku up --demo --host $(HOST) --port $(PORT) $(if $(filter 0,$(OPEN)),,--open)
 
 lint: .setup/python

@@ -27,6 +27,7 @@ import bunraku.session.app
 import bunraku.stream.app
 from bunraku import __version__
 from bunraku.codec import motion_decoder
+from bunraku.compilation import compile_kernels
 from bunraku.demo.bootstrap import open_demo_stage
 from bunraku.http.access_control import requires
 from bunraku.http.access_log import AccessLogMiddleware
@@ -63,6 +64,8 @@ REQUIRED_BACKENDS: dict[str, tuple[Dependency, ...]] = {
     "session": ("bus", "register", "library"),
 }
 """Backends without which a service is not ready."""
+KERNEL_SERVICES = frozenset({"session", "ingest"})
+"""Services that need compiled kernels."""
 WARM_UP_DELAY_S = 1.5
 """Time after the start in which the process only serves, so that the first page loads quickly."""
 SHUTDOWN_TIMEOUT_S = 2
@@ -286,7 +289,14 @@ async def _complete_before_ready(work: Awaitable[None], name: str, readiness: Re
 
 async def _warm_up(context: ServiceContext, apps: Mapping[str, FastAPI]) -> None:
     """Load in a thread what takes seconds to load, so that no request waits for it."""
+    if apps.keys() & KERNEL_SERVICES and not await asyncio.to_thread(limb_solver.is_compiled):
+        context.kernels_compiled.clear()
     await asyncio.sleep(WARM_UP_DELAY_S)
+    if not context.kernels_compiled.is_set():
+        try:
+            await compile_kernels()
+        finally:
+            context.kernels_compiled.set()
     # the catalogue is needed for uploads and to check links for viewers
     if "ingest" in apps or context.authenticator.requires_token:
         try:

@@ -36,6 +36,22 @@ async def test_waiting_jobs_are_counted() -> None:
     assert not slots.locked()
 
 
+async def test_jobs_wait_until_the_machine_is_prepared() -> None:
+    prepared = asyncio.Event()
+    slots = WorkerSlots(2, prepared=prepared)
+    order = list[str]()
+    waiting = [asyncio.create_task(hold_briefly(slots, name, order)) for name in ("aiko", "ben")]
+    for _ in range(3):
+        await asyncio.sleep(0)
+    waiting[1].cancel()
+    assert (order, slots.is_preparing) == ([], True)
+    prepared.set()
+    assert (order, slots.is_preparing) == ([], False)
+    await asyncio.wait(waiting)
+    assert order == ["aiko"]
+    assert not slots.locked()
+
+
 async def test_one_subject_leaves_a_slot_to_others() -> None:
     slots, order = WorkerSlots(2), list[str]()
     async with slots.hold("aiko"):

@@ -61,8 +61,8 @@ class Client:
     ) -> dict[str, Any]:
         """Upload a motion file and wait until it can be watched.
 
-        `progress` receives bytes sent and total; `on_stage` repeatedly receives the server's stage (`waiting`,
-        `reading`, `encoding`) and the share done, 0..1.
+        `progress` receives bytes sent and total; `on_stage` repeatedly receives the server's stage (`preparing`,
+        `waiting`, `reading`, `encoding`) and the share done, 0..1.
         """
         return await self._upload_file(path, "/v1/motions", progress, on_stage)
 

@@ -45,7 +45,7 @@ UploadName = Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)]
 
 def create_app(context: ServiceContext) -> FastAPI:
     """Create the ingest service."""
-    worker_slots = WorkerSlots()
+    worker_slots = WorkerSlots(prepared=context.kernels_compiled)
     motions = MotionOperation(context, worker_slots)
     soundtracks = AudioOperation(context, worker_slots)
     scenes = SceneOperation(context, worker_slots)

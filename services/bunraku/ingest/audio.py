@@ -55,7 +55,7 @@ class AudioOperation:
     ) -> StoreOutcome:
         """Derive a motion with the sound of a file with this SHA-256 digest; raise `ProblemError`."""
         upload_progress = progress or UploadProgress()
-        upload_progress.advance_to("waiting")
+        upload_progress.advance_to("preparing" if self._worker_slots.is_preparing else "waiting")
 
         async def run(new_id: str, stored: StoredMotion) -> JobResult | JobRejection:
             upload_progress.advance_to("reading")

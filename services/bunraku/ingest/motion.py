@@ -42,7 +42,7 @@ class MotionOperation:
     ) -> StoreOutcome:
         """Encode a motion file and store it, unless it is stored already; raise `ProblemError`."""
         progress = progress or UploadProgress()
-        progress.advance_to("waiting")
+        progress.advance_to("preparing" if self._worker_slots.is_preparing else "waiting")
         known = await self._context.catalogue.get_motion(motion_id)
         if known is not None and await self._context.motion_store.get(motion_id) is not None:
             return StoreOutcome(known, False)

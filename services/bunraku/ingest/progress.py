@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-UploadStage = Literal["receiving", "waiting", "reading", "encoding"]
+UploadStage = Literal["receiving", "preparing", "waiting", "reading", "encoding"]
 
 
 @dataclass(slots=True)
 class UploadProgress:
     """Stage of an upload and the completed share of that stage, 0..1.
 
-    The share counts bytes while receiving and blocks while encoding. An upload is waiting while all worker slots are
-    in use. Waiting and reading have no share.
+    The share counts bytes while receiving and blocks while encoding. The server is preparing when it encodes for the
+    first time on its machine. An upload is waiting while all worker slots are in use. These and reading have no share.
     """
 
     stage: UploadStage = "receiving"

@@ -28,9 +28,15 @@ class WorkerSlots:
     one subject do not delay those of others.
     """
 
-    def __init__(self, count: int = MAX_RUNNING_JOBS, clock: Callable[[], float] = time.perf_counter) -> None:
-        """`clock` measures the durations of jobs, in seconds."""
+    def __init__(
+        self,
+        count: int = MAX_RUNNING_JOBS,
+        clock: Callable[[], float] = time.perf_counter,
+        prepared: asyncio.Event | None = None,
+    ) -> None:
+        """`clock` measures the durations of jobs, in seconds. Jobs wait until `prepared` is set, if it is given."""
         self._count = count
+        self._prepared = prepared
         self._clock = clock
         self._held = Counter[str]()
         self._waiters: list[tuple[str, asyncio.Future[None]]] = []
@@ -43,6 +49,11 @@ class WorkerSlots:
         """Number of jobs that wait for a slot."""
         return len(self._waiters)
 
+    @property
+    def is_preparing(self) -> bool:
+        """Return whether no job can run yet, because what all need is being prepared."""
+        return self._prepared is not None and not self._prepared.is_set()
+
     def locked(self) -> bool:
         """Return whether all slots are held."""
         return self._held.total() >= self._count
@@ -50,6 +61,8 @@ class WorkerSlots:
     @asynccontextmanager
     async def hold(self, subject: str) -> AsyncIterator[None]:
         """Hold a slot during the block, for a job of `subject`; an empty one is nobody in particular."""
+        if self._prepared is not None:
+            await self._prepared.wait()
         granted: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiters.append((subject, granted))
         self._grant_slots()

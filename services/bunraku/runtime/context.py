@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -19,6 +20,12 @@ from bunraku.storage.object_folder import make_durable_folder
 
 class DataFolderError(Exception):
     """The data folder cannot be created."""
+
+
+def _completed() -> asyncio.Event:
+    event = asyncio.Event()
+    event.set()
+    return event
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +51,8 @@ class ServiceContext:
     """Metrics of the process, for Prometheus."""
     clock: Callable[[], int] = clock
     """Reference clock, microseconds since 1970."""
+    kernels_compiled: asyncio.Event = field(default_factory=_completed)
+    """Not set while the kernels are compiled for the first time on this machine."""
 
 
 @asynccontextmanager

@@ -128,7 +128,7 @@ export async function shareSession(session: string): Promise<ShareLink> {
 
 /** Current stage of an upload, on the way or on the server, and the share of the stage that is done, 0..1. */
 export interface UploadProgress {
-  stage: "sending" | "waiting" | "reading" | "encoding";
+  stage: "sending" | "preparing" | "waiting" | "reading" | "encoding";
   share: number;
 }
 

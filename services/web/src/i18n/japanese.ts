@@ -169,6 +169,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   waiting: "待機中",
   sending: "送信中",
   queued: "順番待ち",
+  "preparing this server, only once": "サーバーを準備中（初回のみ）",
   "reading the dance": "読み取り中",
   "encoding the dance": "変換中",
   "{seconds} s left": "残り{seconds}秒",

@@ -34,6 +34,7 @@ export function formatIngestStage(stage: UploadProgress["stage"]): string {
     (
       {
         sending: "sending",
+        preparing: "preparing this server, only once",
         waiting: "queued",
         reading: "reading the dance",
         encoding: "encoding the dance",
