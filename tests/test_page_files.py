@@ -2,11 +2,13 @@ from __future__ import annotations
 
 import gzip
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import pytest
+from starlette.exceptions import HTTPException
 
-from bunraku.page_files import accepted_encodings, create_page_app
+from bunraku.page_files import PIECE_BYTES, accepted_encodings, create_page_app
 
 SCRIPT = b"export const answer = 42;" * 100
 STORED = {
@@ -73,6 +75,48 @@ async def test_each_encoding_is_revalidated_by_its_own_tag(page: Path) -> None:
             assert again.headers["vary"] == "Accept-Encoding"
             assert "immutable" in again.headers["cache-control"]
     assert tags["gzip"] != tags["identity"]
+
+
+async def test_head_has_the_headers_of_get_without_the_content(page: Path) -> None:
+    async with open_client(page) as client:
+        head, get = [await client.request(method, "/assets/index-abc.js") for method in ("HEAD", "GET")]
+    assert head.content == b""
+    assert head.headers == get.headers
+
+
+async def test_changed_file_is_read_again(page: Path) -> None:
+    async with open_client(page) as client:
+        before = await client.get("/")
+        (page / "index.html").write_text("<!doctype html><title>rebuilt</title>")
+        after = await client.get("/", headers={"If-None-Match": before.headers["etag"]})
+        assert (after.status_code, after.text) == (200, "<!doctype html><title>rebuilt</title>")
+        assert (await client.get("/", headers={"If-None-Match": after.headers["etag"]})).status_code == 304
+
+
+async def test_large_file_is_sent_in_pieces(page: Path) -> None:
+    content = bytes(range(256)) * 1_000
+    (page / "assets" / "large.bin").write_bytes(content)
+    pieces: list[bytes] = []
+
+    async def send(message: Any) -> None:
+        pieces.append(message.get("body", b""))
+
+    async def receive() -> Any:
+        raise AssertionError("a request without a body")
+
+    scope = {"type": "http", "method": "GET", "path": "/assets/large.bin", "headers": [], "root_path": ""}
+    await create_page_app(page)(scope, receive, send)
+    assert b"".join(pieces) == content
+    assert max(map(len, pieces)) <= PIECE_BYTES
+
+
+async def test_paths_outside_the_page_are_not_found(page: Path) -> None:
+    (page.parent / "secret").write_text("secret")
+    async with open_client(page) as client:
+        for path in ("/../secret", "/assets/..%2f..%2fsecret", "/%2e%2e/secret", "/assets", "/nothing", "/a%00b"):
+            with pytest.raises(HTTPException) as raised:
+                await client.get(path)
+            assert raised.value.status_code == 404, path
 
 
 async def test_files_without_a_copy_are_sent_as_they_are(page: Path) -> None:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+from email.utils import formatdate
+from functools import lru_cache
 from mimetypes import guess_type
 from pathlib import Path
 
 from starlette.datastructures import Headers
 from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.staticfiles import NotModifiedResponse, PathLike, StaticFiles
-from starlette.types import ASGIApp, Scope
+from starlette.types import ASGIApp, Receive, Scope, Send
 
 from bunraku.runtime.problem import ProblemError
 
@@ -35,8 +37,48 @@ IMMUTABLE_PREFIXES = ("assets/", "embed/parts/")
 """Folders whose file names contain a hash of the content."""
 CROSS_ORIGIN_PREFIX = "embed/"
 """Folder of the scripts that pages of every site may load. The scripts are public; their API requests are not."""
+PIECE_BYTES = 16 << 10
+"""Bytes of a file that are sent at once."""
 ENCODINGS = {"br": ".br", "gzip": ".gz"}
 """Content encodings, the best one first, and the suffixes of the copies that `services/web/compress-page.mjs` makes."""
+
+
+class PageFile(Response):
+    """A file of the page, sent from memory in pieces: clients that do not read keep no more than a piece each."""
+
+    def __init__(
+        self,
+        path: PathLike,
+        status: os.stat_result,
+        name: PathLike,
+        status_code: int = 200,
+        encoding: str | None = None,
+    ) -> None:
+        """Send the file at `path` as the content of `name`, which has an encoding if that is another file."""
+        self._content = _read_file(os.fspath(path), status.st_mtime_ns, status.st_size)
+        headers = {"Last-Modified": formatdate(status.st_mtime, usegmt=True), "ETag": _entity_tag(status, encoding)}
+        if encoding is not None:
+            headers["Content-Encoding"] = encoding
+        super().__init__(None, status_code, headers, guess_type(os.fspath(name))[0] or "application/octet-stream")
+        self.headers["Content-Length"] = str(len(self._content))
+
+    async def __call__(self, scope: Scope, _receive: Receive, send: Send) -> None:
+        await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+        pieces = range(0, 0 if scope["method"] == "HEAD" else len(self._content), PIECE_BYTES)
+        for start in pieces:
+            body = self._content[start : start + PIECE_BYTES]
+            await send({"type": "http.response.body", "body": body, "more_body": True})
+        await send({"type": "http.response.body", "body": b""})
+
+
+@lru_cache(maxsize=512)
+def _read_file(path: str, _modified_ns: int, _size: int) -> bytes:
+    """Return the content of a file, which is read again when it has changed."""
+    return Path(path).read_bytes()
+
+
+def _entity_tag(status: os.stat_result, encoding: str | None) -> str:
+    return f'"{status.st_mtime_ns:x}-{status.st_size:x}{"-" + encoding if encoding else ""}"'
 
 
 class PageFiles(StaticFiles):
@@ -67,17 +109,11 @@ class PageFiles(StaticFiles):
             except OSError:
                 # too small to be compressed, or no text
                 continue
-            response = FileResponse(
-                copy,
-                status_code,
-                {"Content-Encoding": encoding},
-                guess_type(os.fspath(full_path))[0],
-                stat_result=stat_result,
-            )
-            if self.is_not_modified(response.headers, headers):
-                return NotModifiedResponse(response.headers)
-            return response
-        return super().file_response(full_path, stat_result, scope, status_code)
+            return self._respond(PageFile(copy, stat_result, full_path, status_code, encoding), headers)
+        return self._respond(PageFile(full_path, stat_result, full_path, status_code), headers)
+
+    def _respond(self, response: Response, headers: Headers) -> Response:
+        return NotModifiedResponse(response.headers) if self.is_not_modified(response.headers, headers) else response
 
 
 def accepted_encodings(header: str) -> list[str]:

@@ -11,13 +11,14 @@ from http import HTTPStatus
 from typing import Any, cast
 
 import h11
+from uvicorn.protocols.http.flow_control import FlowControl
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from bunraku.http.problem_details import MEDIA_TYPE
 from bunraku.http.request_head import BoundedConnection
 from bunraku.runtime.client_network import peer_network
 from bunraku.runtime.input_scheduler import InputScheduler
-from bunraku.runtime.transport import LingeringClose, WriteDeadline, set_send_buffer
+from bunraku.runtime.transport import LingeringClose, WriteDeadline, set_receive_buffer, set_send_buffer
 
 HEADER_TIMEOUT_S = 10.0
 """Time for complete request headers, from the start of the connection or the first byte. Also the time for the rest of
@@ -31,6 +32,10 @@ suggests, so the number adapts to the time that the last piece took."""
 SEND_BUFFER_BYTES = 64 << 10
 """Kernel send buffer of a connection. Requests of a client that does not read wait once it is full; by default it would
 grow to megabytes. It suffices for 1 MB/s at a round-trip time of 100 ms."""
+RECEIVE_BUFFER_BYTES = 16 << 10
+"""Kernel receive buffer of a connection: no more arrives at once. A thousand connections may wait for their turns."""
+BODY_RECEIVE_BUFFER_BYTES = 256 << 10
+"""The same once the application reads a body."""
 PARSE_TIME_S = 1e-3
 """Time after which parsing of a connection's data pauses for other connections."""
 
@@ -63,6 +68,20 @@ class _ResponseTransport:
 
     def close(self) -> None:
         self._protocol.close_after_response()
+
+
+class _BodyFlow(FlowControl):
+    """Flow control that receives faster once the application reads a body, for which it has to be permitted."""
+
+    def __init__(self, transport: asyncio.Transport) -> None:
+        super().__init__(transport)
+        self._reads_body = False
+
+    def resume_reading(self) -> None:
+        if self.read_paused and not self._reads_body:
+            self._reads_body = True
+            set_receive_buffer(self._transport, BODY_RECEIVE_BUFFER_BYTES)
+        super().resume_reading()
 
 
 class _Turn(Enum):
@@ -98,6 +117,8 @@ class HttpProtocol(H11Protocol):
         # responses continue when the buffer is empty
         transport.set_write_buffer_limits(0, 0)
         set_send_buffer(transport, SEND_BUFFER_BYTES)
+        set_receive_buffer(transport, RECEIVE_BUFFER_BYTES)
+        self.flow = _BodyFlow(transport)
         self._write_deadline = WriteDeadline(transport)
         self._start_timeout()
 

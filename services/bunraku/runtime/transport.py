@@ -81,10 +81,19 @@ def set_send_buffer(transport: asyncio.BaseTransport, size: int) -> None:
 
     Linux doubles `size` and counts the overhead of its buffers, so that about as much payload fits in typical messages.
     """
+    _set_buffer(transport, socket.SO_SNDBUF, size)
+
+
+def set_receive_buffer(transport: asyncio.BaseTransport, size: int) -> None:
+    """Limit the kernel's receive buffer of a connection, and with it what arrives at once. See `set_send_buffer`."""
+    _set_buffer(transport, socket.SO_RCVBUF, size)
+
+
+def _set_buffer(transport: asyncio.BaseTransport, option: int, size: int) -> None:
     connected: socket.socket | None = transport.get_extra_info("socket")
     if connected is not None:
         with contextlib.suppress(OSError):
-            connected.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, size)
+            connected.setsockopt(socket.SOL_SOCKET, option, size)
 
 
 class LingeringClose(asyncio.Protocol):
