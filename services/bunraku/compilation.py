@@ -1,7 +1,7 @@
 """First compilation of the kernels on a machine.
 
-It takes a processor a minute. The server compiles in a process of its own while it serves: limbs are solved in Python
-meanwhile, and uploads wait.
+It takes a processor one to two minutes. The server compiles in a process of its own while it serves: limbs are solved
+in Python meanwhile, and uploads wait.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import socket
 import pytest
 
 from bunraku.runtime import transport
-from bunraku.runtime.transport import LingeringClose, WriteDeadline, unsent_bytes
+from bunraku.runtime.transport import LingeringClose, WriteDeadline, set_receive_buffer, unsent_bytes
 from tests.time_limit import HANG_TIMEOUT_S
 
 
@@ -101,3 +101,34 @@ async def test_rejected_client_that_stays_is_aborted(monkeypatch: pytest.MonkeyP
         async with asyncio.timeout(HANG_TIMEOUT_S):
             await loop.sock_sendall(client, b"hello")
             await rejecter.ended.wait()
+
+
+class Reader(asyncio.Protocol):
+    """Protocol with a small receive buffer that reads once, after it was told to."""
+
+    def __init__(self) -> None:
+        self.received: asyncio.Future[int] = asyncio.get_running_loop().create_future()
+        self.connected = asyncio.Event()
+
+    def connection_made(self, connected: asyncio.BaseTransport) -> None:
+        assert isinstance(connected, asyncio.Transport)
+        self.transport = connected
+        set_receive_buffer(connected, 16 << 10)
+        connected.pause_reading()
+        self.connected.set()
+
+    def data_received(self, data: bytes) -> None:
+        self.transport.abort()
+        self.received.set_result(len(data))
+
+
+async def test_no_more_than_the_receive_buffer_arrives_at_once() -> None:
+    reader = Reader()
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        with await connect_to(reader) as client:
+            await reader.connected.wait()
+            with contextlib.suppress(BlockingIOError):
+                while True:
+                    client.send(bytes(64 << 10))
+            reader.transport.resume_reading()
+            assert await reader.received <= 64 << 10

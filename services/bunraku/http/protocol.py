@@ -35,7 +35,7 @@ grow to megabytes. It suffices for 1 MB/s at a round-trip time of 100 ms."""
 RECEIVE_BUFFER_BYTES = 16 << 10
 """Kernel receive buffer of a connection: no more arrives at once. A thousand connections may wait for their turns."""
 BODY_RECEIVE_BUFFER_BYTES = 256 << 10
-"""The same once the application reads a body."""
+"""The same once the application reads a body, or a response without reading it is complete."""
 PARSE_TIME_S = 1e-3
 """Time after which parsing of a connection's data pauses for other connections."""
 

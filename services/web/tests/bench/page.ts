@@ -11,6 +11,9 @@
  *   a processor, the GPU process, and Chromium's own layout and painting.
  * - `drawing`: `draw_calls` and `triangles` of a frame at full quality in the dark theme with three held limbs, shadow
  *   and mirror passes included.
+ * - `software`: `software_fps` and `software_resolution` are the frames per second and the resolution that the stage
+ *   settles at in a window of 1440 x 900, in the dark theme, without a graphics processor. `software_ssim` is the
+ *   smallest structural similarity of three such frames to the picture in full quality, over the first performer.
  * - `memory`: `heap_growth_mb` is the growth of the script heap after a garbage collection, over `--minutes` (30) of
  *   playing, controlling, uploading and opening panels, after a warm-up. `heap_growth_objects_mb` is its share of
  *   objects, `heap_growth_code_mb` that of V8's compiled code. The growth of DOM nodes and listeners is reported too.

@@ -1,5 +1,5 @@
 /** The puppet's material: three.js's physical shading, with finish, pattern and wood from vertex attributes. */
-import { BackSide, Color, type IUniform, MeshPhysicalMaterial, ShaderMaterial, type Texture } from "three";
+import { BackSide, type IUniform, MeshPhysicalMaterial, ShaderMaterial, type Texture } from "three";
 import { NOISE_GLSL } from "../scenery/noise";
 import { createDistantLights, LIGHT_COUNT } from "./distant-lights";
 
@@ -83,28 +83,25 @@ void main() {
 }`;
 const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
 ${FRAGMENT_HEADER_GLSL}
-uniform vec3 ambient, lightDirections[${LIGHT_COUNT}], lightColours[${LIGHT_COUNT}];
+uniform vec3 lightDirections[${LIGHT_COUNT}], lightColours[${LIGHT_COUNT}];
 varying vec3 vColour, vNormal;
 void main() {
   vec4 diffuseColor = vec4(vColour, 1.);
   ${COLOUR_GLSL.replace("#include <color_fragment>", "")}
   vec3 normal = normalize(vNormal);
-  vec3 irradiance = ambient;
+  // Light from everywhere, in place of that of the environment map.
+  vec3 irradiance = vec3(.22);
   for (int i = 0; i < ${LIGHT_COUNT}; i++) irradiance += max(dot(normal, lightDirections[i]), 0.) * lightColours[i];
   gl_FragColor = vec4(diffuseColor.rgb * irradiance, 1.);
   #include <tonemapping_fragment>
   #include <colorspace_fragment>
 }`;
 
-/** Light from everywhere, in place of that of the environment map. */
-const AMBIENT = new Color(0.22, 0.22, 0.22);
-
 /** Create the material for software rendering: colours, patterns and light, without lacquer, grain or reflections. */
 export function createSimpleFigureMaterial(textures: PuppetTextures): ShaderMaterial {
   return new ShaderMaterial({
     uniforms: {
       ...createDistantLights(),
-      ambient: { value: AMBIENT },
       facePaint: { value: textures.face },
       hempLeaf: { value: textures.asanoha },
     },

@@ -1,21 +1,11 @@
 /**
  * Smoothing of edges in a part of the picture, where the context has no antialiasing of its own: without a graphics
- * processor, multisampling takes twice the time of the whole picture, and this a tenth.
+ * processor, multisampling the whole picture takes two and a half times as long (`proto/NOTES.md`, "Page").
  *
  * After FXAA (T. Lottes, NVIDIA, 2009): where the luma of neighbours differs, mix colours along the edge.
  */
-import {
-  FramebufferTexture,
-  type IUniform,
-  LinearFilter,
-  Mesh,
-  OrthographicCamera,
-  PlaneGeometry,
-  Scene,
-  ShaderMaterial,
-  Vector2,
-  type WebGLRenderer,
-} from "three";
+import { FramebufferTexture, type IUniform, LinearFilter, ShaderMaterial, Vector2, type WebGLRenderer } from "three";
+import { FullScreenQuad } from "three/examples/jsm/postprocessing/Pass.js";
 import type { ScreenBox } from "../camera/screen-box";
 
 const FRAGMENT_GLSL = /* glsl */ `
@@ -45,25 +35,17 @@ void main() {
 const REACH_PX = 8;
 
 export class EdgeSmoothing {
-  readonly #scene = new Scene();
-  readonly #camera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
   readonly #texel: IUniform<Vector2> = { value: new Vector2() };
   readonly #picture: IUniform<FramebufferTexture | null> = { value: null };
-  readonly #mesh: Mesh<PlaneGeometry, ShaderMaterial>;
-
-  constructor() {
-    const material = new ShaderMaterial({
-      uniforms: { texel: this.#texel, picture: this.#picture },
-      vertexShader: "void main() { gl_Position = vec4(position.xy, 0., 1.); }",
-      fragmentShader: FRAGMENT_GLSL,
-      depthTest: false,
-      depthWrite: false,
-      toneMapped: false,
-    });
-    this.#mesh = new Mesh(new PlaneGeometry(2, 2), material);
-    this.#mesh.frustumCulled = false;
-    this.#scene.add(this.#mesh);
-  }
+  readonly #material = new ShaderMaterial({
+    uniforms: { texel: this.#texel, picture: this.#picture },
+    vertexShader: "void main() { gl_Position = vec4(position.xy, 0., 1.); }",
+    fragmentShader: FRAGMENT_GLSL,
+    depthTest: false,
+    depthWrite: false,
+    toneMapped: false,
+  });
+  readonly #quad = new FullScreenQuad(this.#material);
 
   /** Smooth what the canvas shows inside `box`, in shares of its width and height (0..1, y down). */
   apply(renderer: WebGLRenderer, box: ScreenBox): void {
@@ -88,15 +70,14 @@ export class EdgeSmoothing {
       smoothed.columns / ratio,
       smoothed.rows / ratio,
     );
-    renderer.render(this.#scene, this.#camera);
+    this.#quad.render(renderer);
     renderer.setScissorTest(false);
     renderer.autoClear = autoClear;
   }
 
   dispose(): void {
     this.#picture.value?.dispose();
-    this.#mesh.geometry.dispose();
-    this.#mesh.material.dispose();
+    this.#material.dispose();
   }
 
   /** Return the texture for a canvas of this size. */

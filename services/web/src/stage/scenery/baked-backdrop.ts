@@ -1,17 +1,9 @@
 /**
- * Backdrop as textures of displayed colours, for software rendering: evaluating its noise for each pixel of each frame
- * takes longer than all else.
+ * Backdrop as textures of displayed colours, for software rendering: its noise is evaluated once, not for each pixel of
+ * each frame.
  */
-import {
-  LinearFilter,
-  Mesh,
-  OrthographicCamera,
-  PlaneGeometry,
-  Scene,
-  ShaderMaterial,
-  type WebGLRenderer,
-  WebGLRenderTarget,
-} from "three";
+import { LinearFilter, ShaderMaterial, type WebGLRenderer, WebGLRenderTarget } from "three";
+import { FullScreenQuad } from "three/examples/jsm/postprocessing/Pass.js";
 import { type BackdropUniforms, DISPLAYED_BACKDROP_GLSL } from "./backdrop";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 
@@ -24,14 +16,13 @@ const TARGET_OPTIONS = { depthBuffer: false, minFilter: LinearFilter, magFilter:
 export class BakedBackdrop {
   readonly #sharp = new WebGLRenderTarget(...SHARP_SIZE, TARGET_OPTIONS);
   readonly #blurred = new WebGLRenderTarget(...BLURRED_SIZE, TARGET_OPTIONS);
-  readonly #scene = new Scene();
-  readonly #camera = new OrthographicCamera(-1, 1, 1, -1, 0, 1);
-  readonly #mesh: Mesh<PlaneGeometry, ShaderMaterial>;
+  readonly #material: ShaderMaterial;
+  readonly #quad: FullScreenQuad;
   #isCurrent = false;
 
   /** Draw the backdrop of `uniforms` to the textures of `baked`. */
   constructor(uniforms: BackdropUniforms, baked: BakedUniforms) {
-    const material = new ShaderMaterial({
+    this.#material = new ShaderMaterial({
       uniforms: { ...uniforms, blur: { value: 0 } },
       vertexShader: "varying vec2 vPlace; void main() { vPlace = uv; gl_Position = vec4(position.xy, 0., 1.); }",
       fragmentShader: /* glsl */ `
@@ -46,8 +37,7 @@ export class BakedBackdrop {
       depthWrite: false,
       toneMapped: false,
     });
-    this.#mesh = new Mesh(new PlaneGeometry(2, 2), material);
-    this.#scene.add(this.#mesh);
+    this.#quad = new FullScreenQuad(this.#material);
     baked.bakedSharp.value = this.#sharp.texture;
     baked.bakedBlurred.value = this.#blurred.texture;
   }
@@ -66,9 +56,9 @@ export class BakedBackdrop {
       [this.#sharp, 0],
       [this.#blurred, BLUR_M],
     ] as const) {
-      this.#mesh.material.uniforms.blur.value = blur;
+      this.#material.uniforms.blur.value = blur;
       renderer.setRenderTarget(target);
-      renderer.render(this.#scene, this.#camera);
+      this.#quad.render(renderer);
     }
     renderer.setRenderTarget(previousTarget);
   }
@@ -76,7 +66,6 @@ export class BakedBackdrop {
   dispose(): void {
     this.#sharp.dispose();
     this.#blurred.dispose();
-    this.#mesh.geometry.dispose();
-    this.#mesh.material.dispose();
+    this.#material.dispose();
   }
 }

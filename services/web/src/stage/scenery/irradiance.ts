@@ -1,4 +1,4 @@
-/** Light of the stage on a matt surface, for the materials of software rendering. */
+/** Light of the stage on a matt surface, for the floor in software rendering. */
 
 /** GLSL for materials with lights: `vec3 irradiance(vec3 position, vec3 normal)`, both in the view's frame. */
 export const IRRADIANCE_GLSL = /* glsl */ `
