@@ -1,21 +1,25 @@
 import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
 
-/** Adds `modulepreload` links for the stage's chunk and its imports: they load in parallel with the page's script. */
-const preloadStage: Plugin = {
-  name: "preload-stage",
+/** Scripts of the engine's worker that draw the first frame. */
+const ENGINE_SCRIPTS = /^assets\/worker-(engine|stage-chunk|performer)-/;
+
+/**
+ * Adds `prefetch` links for the engine's scripts: they load in parallel with the page's. Browsers do not preload for
+ * workers.
+ */
+const preloadEngine: Plugin = {
+  name: "preload-engine",
   transformIndexHtml: {
     order: "post",
-    handler: (html, { bundle }) => {
-      const stage = Object.values(bundle ?? {}).find((file) => file.type === "chunk" && file.name === "stage-chunk");
-      const files =
-        stage?.type === "chunk" ? [stage.fileName, ...stage.imports].filter((file) => !html.includes(file)) : [];
-      return files.map((file) => ({
-        tag: "link",
-        attrs: { rel: "modulepreload", crossorigin: true, href: `/${file}` },
-        injectTo: "head",
-      }));
-    },
+    handler: (_, { bundle }) =>
+      Object.keys(bundle ?? {})
+        .filter((file) => ENGINE_SCRIPTS.test(file))
+        .map((file) => ({
+          tag: "link",
+          attrs: { rel: "prefetch", href: `/${file}` },
+          injectTo: "head",
+        })),
   },
 };
 
@@ -23,7 +27,7 @@ const preloadStage: Plugin = {
 const TEST_TIMEOUT_MS = 120_000;
 
 export default defineConfig({
-  plugins: [preloadStage],
+  plugins: [preloadEngine],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,
@@ -33,6 +37,12 @@ export default defineConfig({
     rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } } },
     // three.js is one chunk of about 600 kB that loads after the page has been drawn.
     chunkSizeWarningLimit: 700,
+  },
+  worker: {
+    format: "es",
+    rolldownOptions: {
+      output: { entryFileNames: "assets/worker-engine-[hash].js", chunkFileNames: "assets/worker-[name]-[hash].js" },
+    },
   },
   // The prior and the constants are imported from proto/.
   server: {

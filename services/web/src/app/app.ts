@@ -1,7 +1,8 @@
 /** Composition of the page: session, stage, inputs, sound and user interface. */
 import { browserSoundPreference } from "../audio/preference";
 import { pageAccess } from "../client/access";
-import { translate } from "../i18n/translator";
+import type { EngineCommand } from "../engine/message";
+import { pageLanguage, translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { loadMapping, saveMapping } from "../input/mapping-store";
 import { FileStore } from "../storage/file-store";
@@ -10,10 +11,11 @@ import { resolveDisplayName } from "../ui/display-name";
 import { createPage, type Page } from "../ui/page";
 import { createTheme, type ThemeChoice } from "../ui/theme";
 import { AvatarSlots } from "./avatar-slot";
-import { ClaimController } from "./claim-controller";
+import { EngineConnection } from "./engine-connection";
 import { Exporter } from "./exporter";
 import { Invitation } from "./invitation";
 import { LibraryController } from "./library-controller";
+import { LimbControls } from "./limb-controls";
 import { PlaybackController } from "./playback-controller";
 import { SoundController } from "./sound-controller";
 import { StageHost } from "./stage-host";
@@ -23,7 +25,7 @@ import { type AppParts, createKeyActions, createUserActions } from "./user-actio
 export class App implements AppParts {
   readonly displayName: string;
   readonly page: Page;
-  readonly limbController: ClaimController;
+  readonly limbs: LimbControls;
   readonly avatarSlots: AvatarSlots;
   readonly soundController: SoundController;
   readonly library: LibraryController;
@@ -31,9 +33,11 @@ export class App implements AppParts {
   readonly playback: PlaybackController;
   readonly exporter: Exporter;
   readonly theme: ThemeChoice;
+  readonly #query: URLSearchParams;
   #mapping: Mapping = loadMapping();
 
   constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence) {
+    this.#query = query;
     const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
     canvas.ariaLabel = translate(
       "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.",
@@ -41,15 +45,21 @@ export class App implements AppParts {
     this.displayName = resolveDisplayName(query, Math.random());
     this.page = createPage(document.body, createUserActions(this));
     const { page } = this;
-    const getPlayback = () => this.playback.current;
-    this.exporter = new Exporter(page, () => ({ playback: getPlayback(), stage: this.stageHost.stage }));
-    this.limbController = new ClaimController(page, () => this.#mapping);
-    this.limbController.viewOnly = !pageAccess.allows("control");
-    this.avatarSlots = new AvatarSlots(
-      { page, files: new FileStore("bunraku"), preferences: browserStorage },
-      this.limbController.selectedPerformer,
+    const engine = new EngineConnection(
+      canvas,
+      {
+        server: location.origin,
+        token: pageAccess.token,
+        language: pageLanguage(),
+        timeOrigin: performance.timeOrigin,
+        bestQuality: query.get("quality") === "best",
+      },
+      (event) => this.stageHost.onEvent(event),
     );
-    this.library = new LibraryController(page, getPlayback);
+    const send = (command: EngineCommand) => engine.post(command);
+    this.limbs = new LimbControls(send, createKeyActions(this));
+    this.exporter = new Exporter(page, () => this.stageHost.takePicture());
+    this.library = new LibraryController(page, () => this.playback.current);
     this.soundController = new SoundController(
       (state) => page.transport.sound.render(state),
       page.transport.sound.element,
@@ -60,16 +70,17 @@ export class App implements AppParts {
       page,
       startup,
       reducedMotion,
-      bestQuality: query.get("quality") === "best",
-      limbController: this.limbController,
-      avatarSlots: this.avatarSlots,
+      engine,
+      limbs: this.limbs,
+      getPlayback: () => this.playback,
       invitation: new Invitation(page.nameTags),
-      actions: createKeyActions(this),
+      viewOnly: !pageAccess.allows("control"),
       getMapping: () => this.#mapping,
-      getTheme: () => this.theme.theme,
-      getPlayback,
-      onOpen: () => this.#exposeDebugHandle(),
     });
+    this.avatarSlots = new AvatarSlots(
+      { page, avatars: this.stageHost.avatars, files: new FileStore("bunraku"), preferences: browserStorage },
+      this.limbs,
+    );
     this.playback = new PlaybackController({
       page,
       startup,
@@ -77,25 +88,22 @@ export class App implements AppParts {
       query,
       displayName: this.displayName,
       library: this.library,
-      limbController: this.limbController,
       soundController: this.soundController,
       avatarSlots: this.avatarSlots,
-      stageHost: this.stageHost,
-      onOpen: () => this.#exposeDebugHandle(),
+      send,
     });
     this.theme = createTheme((theme) => {
       page.header.setTheme(theme);
-      this.stageHost.stage?.setTheme(theme);
+      this.stageHost.setTheme(theme);
     });
   }
 
   /** Enter the session and load the stage, both at the same time. */
   start(): void {
     this.page.mappingDialog.setMapping(this.#mapping);
-    this.limbController.render();
     this.page.transport.setHealth("none");
     void this.playback.start();
-    void this.stageHost.open();
+    void this.stageHost.open(this.#query.get("engine") === "page" ? "page" : "worker");
     this.avatarSlots.restore(1);
   }
 
@@ -104,21 +112,6 @@ export class App implements AppParts {
     this.#mapping = mapping;
     saveMapping(mapping);
     this.page.mappingDialog.setMapping(mapping);
-    this.limbController.render();
-  }
-
-  /** Set `window.bunraku`, the parts of the running page, for tests and for developers. */
-  #exposeDebugHandle(): void {
-    const { current } = this.playback;
-    const { stage, controller } = this.stageHost;
-    Object.assign(window, {
-      bunraku: {
-        stage,
-        viewer: current?.viewer ?? null,
-        puppeteer: current?.puppeteer ?? null,
-        hands: controller?.hands ?? null,
-        listening: this.soundController,
-      },
-    });
+    this.stageHost.setMapping(mapping);
   }
 }

@@ -4,11 +4,7 @@
  */
 
 import { AvatarError, fileTooLarge, MAX_FILE_BYTES } from "../avatar/error";
-import type { AvatarModel } from "../avatar/model";
 import { translate } from "../i18n/translator";
-import type { PerformerSelection } from "../input/performer-selection";
-import type { PerformerFactory } from "../stage/puppet/performer-group";
-import type { Stage } from "../stage/stage";
 import type { FileStore } from "../storage/file-store";
 import type { WebStorage } from "../storage/web-storage";
 import type { AvatarChooser } from "../ui/library/avatar-chooser";
@@ -20,23 +16,34 @@ import { MAX_PERFORMERS } from "../wire/limbs";
 const AVATAR_FILE_KEY = "avatar";
 const AVATAR_ACTIVE_KEY = "bunraku.avatar";
 
+/** Avatars on the stage, by performer. */
+export interface StagedAvatars {
+  /**
+   * Load an avatar, which is then ready to be shown. Return its name, or null if a later request replaced this one.
+   *
+   * @throws AvatarError if the file cannot be used
+   */
+  load(performer: number, file: File): Promise<string | null>;
+  /** Show the avatar, or the puppet. */
+  setActive(performer: number, active: boolean): void;
+  remove(performer: number): void;
+}
+
 export interface AvatarSlotOptions {
   page: {
     readonly library: Pick<LibraryPanel, "problem"> & { readonly danceAs: AvatarChooser };
     readonly toast: ShowToast;
   };
+  avatars: StagedAvatars;
   files: Pick<FileStore, "get" | "put" | "remove">;
   preferences: Pick<WebStorage, "get" | "put" | "remove">;
 }
 
 /** Avatar of one performer. */
 export class AvatarSlot {
-  #stage: Pick<Stage, "setPerformerFactory"> | null = null;
-  #model: AvatarModel | null = null;
-  /** Fits the model to a performer's figure. */
-  #factory: PerformerFactory | null = null;
-  /** `#factory` while the avatar is shown; null while the puppet is. */
-  #activeFactory: PerformerFactory | null = null;
+  /** Name of the loaded avatar, null for none. */
+  #name: string | null = null;
+  #isActive = false;
   /** File that is being loaded. A file chosen later replaces it. */
   #pendingFile: File | null = null;
 
@@ -53,12 +60,6 @@ export class AvatarSlot {
     this.#render();
   }
 
-  /** Set the stage once it is ready. */
-  set stage(stage: Pick<Stage, "setPerformerFactory">) {
-    this.#stage = stage;
-    if (this.#activeFactory) stage.setPerformerFactory(this.#activeFactory, this.performer);
-  }
-
   /** Load the avatar of the last visit, if there was one. Later calls do nothing. */
   async restore(): Promise<void> {
     if (this.#restored) return;
@@ -67,7 +68,7 @@ export class AvatarSlot {
     const active = preferences.get(this.#activeKey);
     if (active === null) return;
     const file = await files.get(this.#fileKey);
-    if (!file || this.#pendingFile || this.#model) return;
+    if (!file || this.#pendingFile || this.#name !== null) return;
     await this.#loadModel(file, active === "yes");
   }
 
@@ -77,7 +78,7 @@ export class AvatarSlot {
     const { page, files, preferences } = this.options;
     preferences.put(this.#activeKey, "yes");
     const isStored = await files.put(this.#fileKey, file);
-    const name = this.#model?.name ?? file.name;
+    const name = this.#name ?? file.name;
     page.toast(
       isStored
         ? translate("{name} dances here; everyone else sees the puppet", { name })
@@ -92,15 +93,17 @@ export class AvatarSlot {
 
   /** Show the avatar, or the puppet. */
   setActive(active: boolean): void {
-    if (!this.#model) return;
+    if (this.#name === null) return;
     this.options.preferences.put(this.#activeKey, active ? "yes" : "no");
     this.#applyActive(active);
   }
 
   /** Remove the avatar, also from the browser's storage. */
   async remove(): Promise<void> {
-    this.#pendingFile = null;
-    this.#disposeModel();
+    this.#pendingFile = this.#name = null;
+    this.#isActive = false;
+    this.options.avatars.remove(this.performer);
+    this.#render();
     this.options.preferences.remove(this.#activeKey);
     await this.options.files.remove(this.#fileKey);
   }
@@ -111,15 +114,9 @@ export class AvatarSlot {
     this.#render();
     try {
       if (file.size > MAX_FILE_BYTES) throw fileTooLarge(file.size);
-      const [{ Avatar, AvatarModel }, bytes] = await Promise.all([import("./avatar-chunk"), file.arrayBuffer()]);
-      const model = await AvatarModel.parse(bytes, file.name.replace(/\.\w+$/, ""));
-      if (this.#pendingFile !== file) {
-        model.dispose();
-        return false;
-      }
-      this.#disposeModel();
-      this.#model = model;
-      this.#factory = (figure) => new Avatar(model, figure);
+      const name = await this.options.avatars.load(this.performer, file);
+      if (this.#pendingFile !== file || name === null) return false;
+      this.#name = name;
       this.#pendingFile = null;
       this.#applyActive(active);
       return true;
@@ -139,24 +136,15 @@ export class AvatarSlot {
   }
 
   #applyActive(active: boolean): void {
-    this.#activeFactory = active ? this.#factory : null;
-    this.#stage?.setPerformerFactory(this.#activeFactory, this.performer);
-    this.#render();
-  }
-
-  /** Show the puppet and free the model. */
-  #disposeModel(): void {
-    if (this.#activeFactory) this.#stage?.setPerformerFactory(null, this.performer);
-    this.#activeFactory = this.#factory = null;
-    this.#model?.dispose();
-    this.#model = null;
+    this.#isActive = active;
+    this.options.avatars.setActive(this.performer, active);
     this.#render();
   }
 
   #render(): void {
     this.options.page.library.danceAs.render(this.performer, {
-      name: this.#model?.name ?? null,
-      active: this.#activeFactory !== null,
+      name: this.#name,
+      active: this.#isActive,
       loadingFile: this.#pendingFile?.name ?? null,
     });
   }
@@ -169,7 +157,7 @@ export class AvatarSlots {
   /** A chosen file applies to the performer that `selectedPerformer` names. */
   constructor(
     options: AvatarSlotOptions,
-    private readonly selectedPerformer: Pick<PerformerSelection, "performer">,
+    private readonly selectedPerformer: { readonly performer: number },
   ) {
     this.#slots = Array.from({ length: MAX_PERFORMERS }, (_, performer) => new AvatarSlot(options, performer));
   }
@@ -177,11 +165,6 @@ export class AvatarSlots {
   /** Slot of the selected performer. */
   get selected(): AvatarSlot {
     return this.#slots[this.selectedPerformer.performer];
-  }
-
-  /** Set the stage once it is ready. */
-  set stage(stage: Pick<Stage, "setPerformerFactory">) {
-    for (const slot of this.#slots) slot.stage = stage;
   }
 
   /** Load the avatars of the last visit for the first `performerCount` performers. */

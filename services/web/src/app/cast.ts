@@ -6,7 +6,7 @@ import type { MotionItem } from "../ui/library/motion-item";
 import type { MotionList } from "../ui/library/motion-list";
 import { showProblem } from "../ui/library/upload";
 import { MAX_PERFORMERS } from "../wire/limbs";
-import type { Playback } from "./playback";
+import type { RemotePlayback } from "./remote-playback";
 
 /**
  * Add the performers of `item` to the motion that `playback` shows. The server stores the result as a new motion, which
@@ -14,13 +14,13 @@ import type { Playback } from "./playback";
  */
 export async function addMotionToStage(
   item: MotionItem,
-  playback: Playback,
+  playback: RemotePlayback,
   motions: MotionList,
   library: Pick<LibraryPanel, "problem">,
 ): Promise<void> {
-  const { motion, performers } = playback.viewer;
+  const { motion, performerCount } = playback;
   if (motion === null) return;
-  if (performers.length + item.performers > MAX_PERFORMERS) {
+  if (performerCount + item.performers > MAX_PERFORMERS) {
     library.problem(
       item.name,
       translate("The stage is full"),
@@ -33,7 +33,7 @@ export async function addMotionToStage(
     const { id } = await addPerformers(motion, [item.id]);
     // The new motion is played even if the list cannot be fetched now.
     await motions.refresh().catch(() => undefined);
-    playback.edit({ motion: id, position: Math.round(playback.position(performance.now()) * 1e6) });
+    playback.edit({ motion: id, position: Math.round(playback.position * 1e6) });
   } catch (error) {
     showProblem(library, item.name, error);
   }

@@ -2,12 +2,10 @@
 import { ProblemError } from "../client/problem";
 import type { ExportFormat, ExportSource } from "../export/export-file";
 import { translate } from "../i18n/translator";
-import type { Stage } from "../stage/stage";
 import { saveFile } from "../ui/library/file-download";
 import type { MotionItem } from "../ui/library/motion-item";
 import { showProblem } from "../ui/library/upload";
 import type { Page } from "../ui/page";
-import type { Playback } from "./playback";
 
 /** Share of a download's progress that fetching its blocks takes; writing the file takes the rest. */
 const FETCH_PROGRESS_SHARE = 0.5;
@@ -17,7 +15,7 @@ export class Exporter {
 
   constructor(
     private readonly page: Page,
-    private readonly getState: () => { playback: Playback | null; stage: Stage | null },
+    private readonly takePicture: () => Promise<Blob>,
   ) {}
 
   /** Write the whole motion of these performers to a file and save it. Errors are reported in the library. */
@@ -31,13 +29,12 @@ export class Exporter {
       const [{ downloadMotion, exportFile, fileName }, puppets] = await loadExportModules();
       const sources: ExportSource[] = [];
       for (const performer of performers) {
-        const existing = this.getState().playback?.viewer.blocksOf(motion.id, performer) ?? null;
         const onProgress = (share: number) =>
           row.showProgress(
             translate("fetching the dance"),
             ((sources.length + share) / performers.length) * FETCH_PROGRESS_SHARE,
           );
-        sources.push(await downloadMotion(motion.id, { performer, existing, signal, onProgress }));
+        sources.push(await downloadMotion(motion.id, { performer, signal, onProgress }));
       }
       const file = await exportFile(format, motion.name, sources, {
         puppets,
@@ -55,12 +52,10 @@ export class Exporter {
 
   /** Save the current frame of the stage as a PNG file named after `name`. */
   async savePicture(name: string): Promise<void> {
-    const { stage } = this.getState();
-    if (!stage || this.#capturing) return;
+    if (this.#capturing) return;
     this.#capturing = true;
     try {
-      const picture = await stage.takePicture();
-      const [{ fileName }] = await loadExportModules();
+      const [{ fileName }, picture] = await Promise.all([loadModule(import("./export-chunk")), this.takePicture()]);
       this.#save(picture, fileName(name || "Bunraku", "png"));
     } catch (error) {
       this.page.toast(
@@ -80,15 +75,16 @@ export class Exporter {
   }
 }
 
-/** Load the exporters, and the stage's functions that build the puppet's model and face. */
+/** Load the exporters, and the functions that build the puppet's model and face. */
 async function loadExportModules() {
-  try {
-    const [exporters, { createPuppetModel, renderFacePng }] = await Promise.all([
-      import("./export-chunk"),
-      import("./stage-chunk"),
-    ]);
-    return [exporters, { renderFacePng, createModel: createPuppetModel }] as const;
-  } catch {
+  const [exporters, { createPuppetModel, renderFacePng }] = await loadModule(
+    Promise.all([import("./export-chunk"), import("../stage/puppet/puppet-model")]),
+  );
+  return [exporters, { renderFacePng, createModel: createPuppetModel }] as const;
+}
+
+function loadModule<Module>(module: Promise<Module>): Promise<Module> {
+  return module.catch(() => {
     throw ProblemError.unreachable();
-  }
+  });
 }

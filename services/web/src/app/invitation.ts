@@ -1,5 +1,5 @@
 /** Invitation to take a hand, shown on a first visit beside the hand nearer to the audience. */
-import type { Stage } from "../stage/stage";
+import type { ScreenPosition } from "../stage/camera/screen-projection";
 import { browserStorage, type WebStorage } from "../storage/web-storage";
 import type { NameTags } from "../ui/strings/name-tag";
 
@@ -17,16 +17,15 @@ export class Invitation {
     this.#finished = storage.get(INVITATION_SHOWN_KEY) !== null;
   }
 
-  /** Show the invitation beside the hand at local time `now` in milliseconds, or end it after its duration. */
-  update(now: number, stage: Pick<Stage, "nearerHand" | "toScreen">): void {
+  /** Show the invitation beside `hand` at local time `now` in milliseconds, or end it after its duration. */
+  update(now: number, hand: ScreenPosition | null): void {
     if (this.#finished) return;
     this.#startedAtMs ??= now;
     if (now - this.#startedAtMs > INVITATION_DURATION_MS) {
       this.finish();
       return;
     }
-    const hand = stage.nearerHand();
-    this.tags.invite(hand && stage.toScreen(hand));
+    this.tags.invite(hand);
   }
 
   /** Hide the invitation, and never show it again in this browser. */

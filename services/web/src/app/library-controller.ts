@@ -2,14 +2,14 @@
 import type { MotionItem } from "../ui/library/motion-item";
 import { MotionList } from "../ui/library/motion-list";
 import type { Page } from "../ui/page";
-import type { Playback } from "./playback";
+import type { RemotePlayback } from "./remote-playback";
 
 export class LibraryController {
   readonly motions = new MotionList();
 
   constructor(
     private readonly page: Pick<Page, "library" | "header">,
-    private readonly getPlayback: () => Playback | null,
+    private readonly getPlayback: () => RemotePlayback | null,
   ) {}
 
   /** The motion on the stage; null if there is none, or if the list does not contain it. */
@@ -18,7 +18,7 @@ export class LibraryController {
   }
 
   get #currentMotion(): string | null {
-    return this.getPlayback()?.viewer.motion ?? null;
+    return this.getPlayback()?.motion ?? null;
   }
 
   /** Fetch the list and display it. Rejects with ProblemError. */

@@ -1,18 +1,18 @@
 /** Playback of the page: enter a session or a motion, show its state, and replace it by another. */
 import { pageAccess } from "../client/access";
-import { createSession } from "../client/api";
+import { createSession, findOrCreateSession } from "../client/api";
 import { ProblemError } from "../client/problem";
+import type { EngineCommand, PlaybackChange, ViewerTime } from "../engine/message";
+import type { PlaybackKind } from "../engine/playback";
 import { translate } from "../i18n/translator";
 import { showProblem } from "../ui/library/upload";
 import type { Page } from "../ui/page";
 import { PHONE } from "../ui/panel";
 import type { AvatarSlots } from "./avatar-slot";
-import type { ClaimController } from "./claim-controller";
 import type { LibraryController } from "./library-controller";
-import { findOrCreateSession, Playback, type PlaybackKind } from "./playback";
+import { RemotePlayback } from "./remote-playback";
 import { restorePosition } from "./saved-position";
 import type { SoundController } from "./sound-controller";
-import type { StageHost } from "./stage-host";
 import type { StartupSequence } from "./startup";
 
 export interface PlaybackControllerOptions {
@@ -24,38 +24,50 @@ export interface PlaybackControllerOptions {
   query: URLSearchParams;
   displayName: string;
   library: LibraryController;
-  limbController: ClaimController;
   soundController: SoundController;
   avatarSlots: AvatarSlots;
-  stageHost: Pick<StageHost, "setPlayback" | "updatePerformers">;
-  /** Called after another session or motion was entered. */
-  onOpen(): void;
+  /** Send a message to the engine. */
+  send(command: EngineCommand): void;
 }
 
 export class PlaybackController {
-  #current: Playback | null = null;
+  #current: RemotePlayback | null = null;
+  #openedCount = 0;
   #accessDenied = false;
 
   constructor(private readonly options: PlaybackControllerOptions) {
-    pageAccess.onUnauthorized(({ title, detail, hint }) => {
-      this.#accessDenied = true;
-      const text = hint ? translate("{detail}; {hint}.", { detail, hint }) : detail;
-      options.page.notice("access", title, text);
-    });
+    pageAccess.onUnauthorized((problem) => this.onUnauthorized(problem));
   }
 
   /** The session or motion on the stage; null before one was entered. */
-  get current(): Playback | null {
+  get current(): RemotePlayback | null {
     return this.#current;
   }
 
+  /** Apply a change of a playback. */
+  onChange(playback: number, change: PlaybackChange): void {
+    if (this.#current?.number === playback) this.#current.apply(change);
+  }
+
+  /** Set the time of a playback. */
+  onTime(playback: number, time: ViewerTime | null): void {
+    if (this.#current?.number === playback) this.#current.setTime(time);
+  }
+
+  /** Report a rejected token. */
+  onUnauthorized({ title, detail, hint }: Pick<ProblemError, "title" | "detail" | "hint">): void {
+    this.#accessDenied = true;
+    const text = hint ? translate("{detail}; {hint}.", { detail, hint }) : detail;
+    this.options.page.notice("access", title, text);
+  }
+
   togglePlaying(): void {
-    const timeline = this.#current?.viewer.timeline;
+    const timeline = this.#current?.timeline;
     if (timeline) this.#current?.edit({ playing: !timeline.playing });
   }
 
   toggleLoop(): void {
-    this.#current?.edit({ loop: !this.#current.viewer.timeline?.loop });
+    this.#current?.edit({ loop: !this.#current.timeline?.loop });
   }
 
   /** Enter the session or motion that the address names, else the running session, else a new one. */
@@ -112,20 +124,13 @@ export class PlaybackController {
   }
 
   /** Enter a session or motion, and leave the current one. */
-  #open(id: string, kind: PlaybackKind = "sessions"): Playback {
-    const { displayName, library, limbController, page, soundController, stageHost, startup } = this.options;
-    this.#current?.close();
-    const playback = new Playback(
-      id,
-      displayName,
-      (error) => page.toast(error instanceof ProblemError ? translate("{title}: {detail}", error) : String(error)),
-      { kind },
-    );
+  #open(id: string, kind: PlaybackKind = "sessions"): RemotePlayback {
+    const { displayName, library, page, send, soundController, startup } = this.options;
+    const playback = new RemotePlayback(++this.#openedCount, id, kind, send);
+    send({ type: "open", playback: { number: playback.number, id, kind, name: displayName } });
     this.#current = playback;
     document.documentElement.toggleAttribute("data-own", kind === "motions");
-    limbController.setPlayback(playback);
-    stageHost.setPlayback(playback);
-    startup.runWhenFinished(() => this.#current === playback && soundController.setViewer(playback.viewer));
+    startup.runWhenFinished(() => this.#current === playback && soundController.setViewer(playback));
     const url = new URL(location.href);
     url.searchParams.set(kind === "motions" ? "motion" : "session", id);
     history.replaceState(null, "", url);
@@ -136,65 +141,56 @@ export class PlaybackController {
     this.#bindPresence(playback);
     this.#bindConnection(playback);
     library.render();
-    this.options.onOpen();
     return playback;
   }
 
   /** Show the performers and the name of the motion whenever they change. */
-  #bindMotion({ viewer }: Playback): void {
-    const { avatarSlots, library, stageHost } = this.options;
-    const updatePerformers = () => {
-      stageHost.updatePerformers();
-      avatarSlots.restore(viewer.performers.length);
-    };
-    viewer.addEventListener("figure", () => {
+  #bindMotion(playback: RemotePlayback): void {
+    const { avatarSlots, library } = this.options;
+    const updatePerformers = () => avatarSlots.restore(playback.performerCount);
+    playback.addEventListener("figure", () => {
       updatePerformers();
-      if (!library.motions.find(viewer.motion)) void library.refresh().catch(() => undefined);
+      if (!library.motions.find(playback.motion)) void library.refresh().catch(() => undefined);
       library.render();
     });
-    viewer.addEventListener("tracks", updatePerformers);
+    playback.addEventListener("tracks", updatePerformers);
   }
 
-  #bindTransport({ viewer }: Playback): void {
+  #bindTransport(playback: RemotePlayback): void {
     const { transport } = this.options.page;
     const renderTimeline = () => {
-      const { timeline } = viewer;
+      const { timeline } = playback;
       transport.setTimeline(timeline?.playing ?? false, timeline?.loop ?? false, timeline !== null);
     };
-    viewer.addEventListener("timeline", renderTimeline);
-    viewer.addEventListener("blocks", () => transport.setBlocks(viewer.blocks, viewer.ladder.length));
+    playback.addEventListener("timeline", renderTimeline);
+    playback.addEventListener("blocks", () => transport.setBlocks(playback.blocks, playback.levelCount));
     renderTimeline();
   }
 
-  #bindPresence(playback: Playback): void {
+  #bindPresence(playback: RemotePlayback): void {
     const { page, startup } = this.options;
-    const { viewer, puppeteer } = playback;
     const render = () =>
       startup.runWhenFinished(
-        () => this.#current === playback && page.header.renderPeople(viewer.presence, puppeteer.id),
+        () => this.#current === playback && page.header.renderPeople(playback.presence, playback.puppeteerId),
       );
-    viewer.addEventListener("presence", render);
-    puppeteer.addEventListener("welcome", render);
+    playback.addEventListener("presence", render);
+    playback.addEventListener("welcome", render);
   }
 
-  #bindConnection({ viewer, kind }: Playback): void {
-    const { limbController, page } = this.options;
-    viewer.addEventListener("open", () => {
-      limbController.connected = true;
+  #bindConnection(playback: RemotePlayback): void {
+    const { page } = this.options;
+    playback.addEventListener("open", () => {
       page.notice("dance", null);
       page.toast.showDisconnected(null);
-      limbController.render();
     });
-    viewer.addEventListener("closed", (event) => {
-      const wasConnected = limbController.connected;
-      limbController.connected = false;
-      limbController.render();
+    playback.addEventListener("closed", (event) => {
+      const { isClosed, isConnected, kind } = playback;
       const reason = String((event as CustomEvent<string>).detail);
-      if (viewer.isClosed || this.#accessDenied) page.toast.showDisconnected(null);
+      if (isClosed || this.#accessDenied) page.toast.showDisconnected(null);
       if (this.#accessDenied) return;
-      if (viewer.isClosed)
+      if (isClosed)
         page.notice("dance", translate(kind === "motions" ? "The dance has ended" : "The session has ended"), reason);
-      else if (wasConnected)
+      else if (isConnected)
         page.toast.showDisconnected(translate("Connection lost, reconnecting: {reason}", { reason }));
     });
   }

@@ -2,7 +2,7 @@
  * Position of a motion with a private timeline, saved while the page reloads. A session's timeline is on the server.
  */
 import { tabStorage } from "../storage/web-storage";
-import type { Playback } from "./playback";
+import type { RemotePlayback } from "./remote-playback";
 
 const STORAGE_KEY = "bunraku.left";
 
@@ -14,23 +14,24 @@ interface SavedPosition {
   loop: boolean;
 }
 
-/** Save the position of a motion at local time `now` in milliseconds. Does nothing for a session. */
-export function savePosition(playback: Playback, now: number): void {
-  const { timeline } = playback.viewer;
+/** Save the position of a motion. Does nothing for a session. */
+export function savePosition(playback: RemotePlayback): void {
+  const { timeline } = playback;
   if (playback.kind !== "motions" || !timeline) return;
   tabStorage.putJson(STORAGE_KEY, {
     motion: playback.id,
-    position: playback.position(now),
+    position: playback.position,
     playing: timeline.playing,
     loop: timeline.loop,
   } satisfies SavedPosition);
 }
 
 /** Restore the saved position of this motion, and delete it. */
-export function restorePosition(playback: Playback): void {
+export function restorePosition(playback: RemotePlayback): void {
   const saved = tabStorage.getJson(STORAGE_KEY) as SavedPosition | null;
   tabStorage.remove(STORAGE_KEY);
   if (saved?.motion !== playback.id) return;
   const { position, playing, loop } = saved;
-  playback.viewer.addEventListener("timeline", () => playback.viewer.edit({ position, playing, loop }), { once: true });
+  const edit = { position: Math.round(position * 1e6), playing, loop };
+  playback.addEventListener("timeline", () => playback.edit(edit), { once: true });
 }

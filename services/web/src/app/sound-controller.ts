@@ -1,9 +1,11 @@
 /** Sound of the motion on the stage. Audio code is loaded once a motion has sound and the person wants to hear it. */
+
+import type { AudioPackets } from "../audio/player";
 import type { SoundPreference, SoundPreferenceStore } from "../audio/preference";
 import type { AudioPlayer } from "../audio/sound";
 import { Speaker } from "../audio/speaker";
-import type { Viewer } from "../client/viewer";
-import type { AudioBlockStore } from "../playout/audio-store";
+import type { LeaderTime } from "../playout/presentation-clock";
+import type { TimelineHistory } from "../playout/timeline";
 
 /** State that the sound button shows. */
 export interface SoundState {
@@ -14,16 +16,32 @@ export interface SoundState {
   readonly volume: number;
 }
 
+/**
+ * Viewer whose sound is played. Its events "figure", "tracks" and "timeline" announce another `audio` and changes of the
+ * timeline.
+ */
+export interface SoundSource extends EventTarget {
+  /** Packets of the motion's audio track, null if it has none. */
+  readonly audio: AudioPackets | null;
+  readonly timelineHistory: TimelineHistory;
+  /** True if the clock estimate will change little. */
+  readonly isClockSettled: boolean;
+  /** Return the reference time that the stage would present without sound at local `nowMs`, microseconds. */
+  ownTime(nowMs: number): number;
+  /** Source of the stage time that the audio presents at local `nowMs`. */
+  leader: ((nowMs: number) => LeaderTime | null) | null;
+}
+
 /** Events that browsers accept as the user activation that audio playback requires. */
 const USER_ACTIVATION_EVENTS = ["pointerdown", "pointerup", "click", "keydown"] as const;
 
 export class SoundController {
-  #viewer: Viewer | null = null;
+  #viewer: SoundSource | null = null;
   #preference: SoundPreference;
   #speaker: Speaker | null = null;
   #player: AudioPlayer | null = null;
   /** Sound of the current motion; null if it has none. */
-  #audioStore: AudioBlockStore | null = null;
+  #audioStore: AudioPackets | null = null;
   /** Set while the gesture that resumed the sound is handled: its own command must not switch the sound off again. */
   #resumedByGesture = false;
   readonly #abortController = new AbortController();
@@ -54,7 +72,7 @@ export class SoundController {
   }
 
   /** Play the sound of this viewer's motions; null stops the sound. */
-  setViewer(viewer: Viewer | null): void {
+  setViewer(viewer: SoundSource | null): void {
     this.#viewer = viewer;
     viewer?.addEventListener("figure", () => void this.#updatePlayer());
     viewer?.addEventListener("tracks", () => void this.#updatePlayer());
@@ -130,7 +148,7 @@ export class SoundController {
           store,
           timelines: viewer.timelineHistory,
           viewerTime: (now) => viewer.ownTime(now),
-          isClockSettled: () => viewer.clock.isSettled,
+          isClockSettled: () => viewer.isClockSettled,
         },
         decoder,
       );

@@ -1,97 +1,105 @@
-/** Stage of the page: load the renderer, connect its inputs, and draw every frame. */
+/** Stage of the page: starts the engine, passes the inputs to it, and shows what it reports. */
+import { AvatarError } from "../avatar/error";
+import type { CameraKeyframe } from "../client/api";
+import type { ClaimState } from "../engine/claim-controller";
+import type { EngineEvent, EngineSettings, StageState } from "../engine/message";
 import { translate } from "../i18n/translator";
-import type { PageActions } from "../input/command-dispatcher";
-import type { GamepadInput } from "../input/gamepad";
+import { createGamepadInput, type GamepadInput } from "../input/gamepad";
+import { listenToKeyboard } from "../input/keyboard";
 import type { Mapping } from "../input/mapping";
-import { type Graphics, openGraphics } from "../stage/rendering/graphics";
+import { listenToMouse } from "../input/mouse";
+import { listenToPointer, showPointerState } from "../input/pointer-events";
+import { LIMBS } from "../motion/skeleton";
 import type { Theme } from "../stage/scenery/look";
-import type { Stage } from "../stage/stage";
 import type { Page } from "../ui/page";
 import { LANDSCAPE_PHONE, PHONE } from "../ui/panel";
-import type { AvatarSlots } from "./avatar-slot";
-import type { ClaimController } from "./claim-controller";
+import type { StagedAvatars } from "./avatar-slot";
+import { type EngineConnection, EngineError, type EngineRealm } from "./engine-connection";
 import type { Invitation } from "./invitation";
-import type { Playback } from "./playback";
-import type { StageController } from "./stage-controller";
+import type { LimbControls } from "./limb-controls";
+import type { PlaybackController } from "./playback-controller";
 import type { StartupSequence } from "./startup";
 
-const STATISTICS_INTERVAL_MS = 500;
+/** Limbs of one performer before the engine has reported any. */
+const NO_CLAIMS: ClaimState = {
+  limbs: LIMBS.map(() => ({ holder: null, requesters: [], requestedByMe: false, selected: false })),
+  isReady: false,
+  performer: 0,
+  giveKey: null,
+};
 
 export interface StageHostOptions {
   canvas: HTMLCanvasElement;
   page: Page;
   startup: StartupSequence;
   reducedMotion: MediaQueryList;
-  /** Draw in the best quality, whatever it costs. */
-  bestQuality: boolean;
-  limbController: ClaimController;
-  avatarSlots: AvatarSlots;
+  engine: EngineConnection;
+  limbs: LimbControls;
   invitation: Invitation;
-  actions: PageActions;
+  /** True if this page may not claim limbs. */
+  viewOnly: boolean;
+  getPlayback(): Pick<PlaybackController, "current" | "onChange" | "onTime" | "onUnauthorized">;
   getMapping(): Mapping;
-  getTheme(): Theme;
-  getPlayback(): Playback | null;
-  /** Called when the stage is ready. */
-  onOpen(): void;
 }
 
 export class StageHost {
-  /** Limb whose control has the focus. */
-  focusedLimb: number | null = null;
-  #controller: StageController | null = null;
   #gamepad: GamepadInput | null = null;
-  #lastStatisticsMs = 0;
+  #state: StageState | null = null;
+  #isReady = false;
 
   constructor(private readonly options: StageHostOptions) {}
 
-  /** Null until the renderer was loaded, and if it cannot be. */
-  get controller(): StageController | null {
-    return this.#controller;
+  /** Start the engine and pass the inputs to it. */
+  async open(realm: EngineRealm): Promise<void> {
+    const { engine, reducedMotion } = this.options;
+    this.#setSettings({
+      reducedMotion: reducedMotion.matches,
+      mapping: this.options.getMapping(),
+      isHidden: document.hidden,
+    });
+    reducedMotion.addEventListener("change", () => this.#setSettings({ reducedMotion: reducedMotion.matches }));
+    this.#showLimbs(NO_CLAIMS);
+    this.resize();
+    addEventListener("resize", () => this.resize());
+    this.#listenToInputs();
+    await engine.start(realm);
   }
 
-  get stage(): Stage | null {
-    return this.#controller?.stage ?? null;
+  setTheme(theme: Theme): void {
+    this.#setSettings({ theme });
+  }
+
+  setMapping(mapping: Mapping): void {
+    this.#setSettings({ mapping });
   }
 
   /** Follow the motion's own camera, or return to the audience's view. */
   toggleCamera(): void {
-    this.stage?.followMotionCamera(!this.stage.followsMotionCamera);
+    this.options.engine.post({ type: "toggle camera" });
   }
 
-  setPlayback(playback: Playback): void {
-    this.stage?.cameraRecorder.clear();
-    this.#controller?.setPlayback(playback);
+  /** Return the stage with its strings as PNG. */
+  takePicture(): Promise<Blob> {
+    return this.options.engine.request({ kind: "picture" });
   }
 
-  updatePerformers(): void {
-    this.#controller?.updatePerformers();
+  /** Return the camera's movement during the last loop of the motion; empty if the camera was not moved. */
+  cameraKeyframes(): Promise<CameraKeyframe[]> {
+    return this.options.engine.request({ kind: "camera keyframes" });
   }
 
-  /** Load the renderer and start drawing. Shows a notice if this browser cannot. */
-  async open(): Promise<void> {
-    const { canvas, bestQuality } = this.options;
-    let graphics: Graphics;
-    try {
-      graphics = openGraphics(canvas, bestQuality);
-    } catch {
-      this.#showUnavailable(translate("It needs WebGL 2. Try another browser, or switch on hardware acceleration."));
-      return;
-    }
-    const chunk = await import("./stage-chunk").catch(() => null);
-    if (!chunk) {
-      this.#showUnavailable(
-        translate("The renderer could not be loaded. Check your connection, then reload this page."),
-      );
-      return;
-    }
-    // Handle messages that arrived meanwhile first: the requests they lead to are sent before the stage is built.
-    await new Promise((resolve) => setTimeout(resolve));
-    this.#build(chunk, graphics);
-    this.options.onOpen();
-    this.resize();
-    addEventListener("resize", () => this.resize());
-    this.options.startup.onStageReady();
-    requestAnimationFrame(() => this.#drawFrame());
+  /** Avatars on the stage. */
+  get avatars(): StagedAvatars {
+    const { engine } = this.options;
+    return {
+      load: (performer, file) =>
+        engine.request({ kind: "load avatar", performer, file }).catch((error: unknown) => {
+          const known = error instanceof EngineError ? error.failure.known : null;
+          throw known ? new AvatarError(known.title, known.detail, known.hint) : error;
+        }),
+      setActive: (performer, active) => engine.post({ type: "avatar active", performer, active }),
+      remove: (performer) => engine.post({ type: "remove avatar", performer }),
+    };
   }
 
   /** Fit the picture to the window, beside the panels that are open. */
@@ -104,111 +112,157 @@ export class StageHost {
         : panels.isSheetOpen
           ? "sheet"
           : "phone";
-    this.stage?.resize(
-      innerWidth,
-      innerHeight,
-      framing,
-      devicePixelRatio,
-      framing === "desktop" || framing === "sideways" ? panels.sideInsets : [0, 0],
-      panels.bottomInset,
-    );
+    this.#setSettings({
+      viewport: {
+        width: innerWidth,
+        height: innerHeight,
+        framing,
+        pixelRatio: devicePixelRatio,
+        sideInsets: framing === "desktop" || framing === "sideways" ? panels.sideInsets : [0, 0],
+        bottomInset: panels.bottomInset,
+      },
+    });
   }
 
-  #build(chunk: typeof import("./stage-chunk"), graphics: Graphics): void {
-    const { canvas, page, limbController, reducedMotion, avatarSlots, getMapping } = this.options;
-    const controller = new chunk.StageController(canvas, limbController, {
-      getMapping,
-      actions: this.options.actions,
-      onClaimsChange: () => this.#onClaimsChange(),
-      graphics,
-    });
-    this.#controller = controller;
-    const { stage, commands, velocity } = controller;
-    this.#reportContextLoss();
-    stage.reducedMotion = reducedMotion.matches;
-    reducedMotion.addEventListener("change", () => (stage.reducedMotion = reducedMotion.matches));
-    stage.setTheme(this.options.getTheme());
-    avatarSlots.stage = stage;
-    chunk.listenToKeyboard(window, commands, velocity, getMapping, {
+  /** Handle an event of the engine. */
+  onEvent(event: EngineEvent): void {
+    const { invitation, limbs, page } = this.options;
+    const playback = this.options.getPlayback();
+    switch (event.type) {
+      case "ready":
+        this.#isReady = true;
+        this.options.startup.onStageReady();
+        requestAnimationFrame(() => this.#renderFrame());
+        break;
+      case "unavailable":
+        this.#showUnavailable(event.reason);
+        break;
+      case "frame":
+        playback.onTime(event.playback, event.time);
+        if (event.state) this.#setState(event.state);
+        break;
+      case "playback":
+        playback.onChange(event.playback, event.change);
+        break;
+      case "statistics": {
+        const { current } = playback;
+        playback.onTime(event.playback, event.time);
+        // Statistics begin when the stage is drawn.
+        if (current?.number !== event.playback || !this.#isReady) break;
+        page.link.addSample(event.statistics, current.levelCount);
+        page.transport.setHealth(page.link.assessHealth(event.statistics, event.isConnected));
+        break;
+      }
+      case "limbs":
+        this.#showLimbs(event.state);
+        break;
+      case "holding":
+        if (event.isHoldingAny) invitation.finish();
+        break;
+      case "toast": {
+        const { ask } = event;
+        if (ask) page.toast(event.message, { label: ask.label, key: ask.key, run: () => limbs.act("ask", ask.limb) });
+        else page.toast(event.message);
+        break;
+      }
+      case "limb notice":
+        page.strings.notice(event.text);
+        break;
+      case "edit failed":
+        page.toast(event.problem ? translate("{title}: {detail}", event.problem) : event.message);
+        break;
+      case "unauthorized":
+        playback.onUnauthorized(event);
+        break;
+      case "graphics":
+        this.#showContextLoss(event.isLost);
+        break;
+    }
+  }
+
+  #setSettings(settings: Partial<EngineSettings>): void {
+    this.options.engine.post({ type: "set", settings });
+  }
+
+  #showLimbs({ limbs, isReady, performer, giveKey }: ClaimState): void {
+    const { page } = this.options;
+    this.options.limbs.performer = performer;
+    page.strings.render(limbs, isReady, performer);
+    page.limbRequests.render(limbs, giveKey);
+    page.library.danceAs.dancers(limbs, performer);
+  }
+
+  #setState(state: StageState): void {
+    const { canvas, limbs, page, startup } = this.options;
+    this.#state = state;
+    limbs.update(state);
+    showPointerState(canvas, state);
+    page.transport.setCamera(state.hasMotionCamera, state.followsMotionCamera);
+    if (state.hasDrawnPerformer) startup.finish();
+  }
+
+  #listenToInputs(): void {
+    const { canvas, engine, limbs, page, getMapping } = this.options;
+    const { commands } = limbs;
+    listenToKeyboard(window, commands, limbs, getMapping, {
       showKeys: () => page.mappingDialog.show(),
       onEscape: () => page.panels.closeLast(),
     });
-    chunk.listenToMouse(canvas, window, commands, getMapping);
-    this.#gamepad = chunk.createGamepadInput(commands, getMapping, () => navigator.getGamepads());
-    const playback = this.options.getPlayback();
-    if (playback) controller.setPlayback(playback);
+    listenToMouse(canvas, window, commands, getMapping);
+    listenToPointer(canvas, (event) => engine.post({ type: "pointer", event }));
+    this.#gamepad = createGamepadInput(commands, getMapping, () => navigator.getGamepads());
     // A page in the background draws no frames, so nothing would release the inputs that were pressed.
     document.addEventListener("visibilitychange", () => {
-      if (document.hidden) controller.releaseInputs();
+      this.#setSettings({ isHidden: document.hidden });
+      if (document.hidden) commands.releaseAll();
     });
   }
 
-  #onClaimsChange(): void {
-    if (this.#controller?.hands.isHoldingAny) this.options.invitation.finish();
-    this.options.limbController.render();
-  }
-
-  #reportContextLoss(): void {
-    const { canvas, page } = this.options;
-    canvas.addEventListener("webglcontextlost", () =>
+  #showContextLoss(isLost: boolean): void {
+    const { page } = this.options;
+    if (isLost)
       page.notice(
         "graphics",
         translate("The stage went dark"),
         translate("The browser stopped the graphics. They usually return by themselves; if not, reload this page."),
-      ),
-    );
-    canvas.addEventListener("webglcontextrestored", () => page.notice("graphics", null));
+      );
+    else page.notice("graphics", null);
   }
 
   /** Report that there will be no stage, and run the callbacks that wait for the first frame. */
-  #showUnavailable(reason: string): void {
+  #showUnavailable(reason: "graphics" | "not loaded"): void {
     this.options.startup.finish();
-    this.options.page.notice("graphics", translate("This browser cannot draw the stage"), reason);
-  }
-
-  #drawFrame(): void {
-    requestAnimationFrame(() => this.#drawFrame());
-    const { limbController, invitation, page, startup } = this.options;
-    const { stage } = this;
-    if (!stage || !this.#controller) return;
-    const now = performance.now();
-    this.#updateGamepad(stage, now);
-    const { pose, limbs } = this.#controller.draw(now, this.focusedLimb);
-    const { faceBoxes } = stage;
-    page.nameTags.render(
-      limbs,
-      pose ? limbs.map((_, limb) => stage.barBox(limb)) : [],
-      faceBoxes,
-      now,
-      limbController.selectedPerformer.performer,
+    this.options.page.notice(
+      "graphics",
+      translate("This browser cannot draw the stage"),
+      reason === "graphics"
+        ? translate("It needs WebGL 2. Try another browser, or switch on hardware acceleration.")
+        : translate("The renderer could not be loaded. Check your connection, then reload this page."),
     );
-    page.messageArea.avoidFaces(faceBoxes);
-    if (pose && !limbController.viewOnly) invitation.update(now, stage);
-    if (stage.hasDrawnPerformer) startup.finish();
-    page.transport.setCamera(stage.hasMotionCamera, stage.followsMotionCamera);
-    this.#renderPlayback(now);
   }
 
-  #updateGamepad(stage: Stage, now: number): void {
+  /** Update the elements over the stage, which move with it. */
+  #renderFrame(): void {
+    requestAnimationFrame(() => this.#renderFrame());
+    const { invitation, limbs, page, viewOnly } = this.options;
+    const now = performance.now();
+    this.#updateGamepad(now);
+    const state = this.#state;
+    if (state) {
+      page.nameTags.render(state.limbs, state.bars, state.faces, now, limbs.performer);
+      page.messageArea.avoidFaces(state.faces);
+      if (state.hasPose && !viewOnly) invitation.update(now, state.nearerHand);
+    }
+    const { current } = this.options.getPlayback();
+    if (!current) return;
+    page.transport.setPosition(current.position, current.duration);
+    current.sendLead(now);
+  }
+
+  #updateGamepad(now: number): void {
     const { mappingDialog } = this.options.page;
     // Browsers start to look for gamepads when they are first polled.
-    if (stage.hasDrawnPerformer || mappingDialog.isOpen) this.#gamepad?.update(now, !mappingDialog.isCapturing);
+    if (this.#state?.hasDrawnPerformer || mappingDialog.isOpen) this.#gamepad?.update(now, !mappingDialog.isCapturing);
     if (mappingDialog.isOpen) mappingDialog.updateGamepad(this.#gamepad?.pad ?? null);
-  }
-
-  /** Show position and statistics of the playback, and record how long the frame that began at `now` took. */
-  #renderPlayback(now: number): void {
-    const { page, limbController } = this.options;
-    const playback = this.options.getPlayback();
-    if (!playback) return;
-    const { viewer } = playback;
-    page.transport.setPosition(playback.position(now), viewer.duration);
-    if (now - this.#lastStatisticsMs >= STATISTICS_INTERVAL_MS) {
-      this.#lastStatisticsMs = now;
-      const statistics = viewer.statistics();
-      page.link.addSample(statistics, viewer.ladder.length);
-      page.transport.setHealth(page.link.assessHealth(statistics, limbController.connected));
-    }
-    viewer.recordFrame(performance.now() - now);
   }
 }

@@ -1,6 +1,6 @@
 /** Actions of the page's controls and of its keys, as functions of the application's parts. */
 import { pageAccess } from "../client/access";
-import { type CameraKeyframe, recordSession } from "../client/api";
+import { recordSession } from "../client/api";
 import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
@@ -12,9 +12,9 @@ import type { ThemeChoice } from "../ui/theme";
 import { createRecordAction } from "../ui/transport/recording";
 import type { AvatarSlots } from "./avatar-slot";
 import { addMotionToStage } from "./cast";
-import type { ClaimController } from "./claim-controller";
 import type { Exporter } from "./exporter";
 import type { LibraryController } from "./library-controller";
+import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
 import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
@@ -25,7 +25,7 @@ import type { StageHost } from "./stage-host";
 export interface AppParts {
   readonly displayName: string;
   readonly page: Page;
-  readonly limbController: ClaimController;
+  readonly limbs: LimbControls;
   readonly avatarSlots: AvatarSlots;
   readonly soundController: SoundController;
   readonly library: LibraryController;
@@ -41,7 +41,7 @@ export function createUserActions(app: AppParts): UserActions {
   return {
     share: () => void copyShareLink(app.playback.current?.id ?? null, app.page.toast),
     language: () => {
-      if (app.playback.current) savePosition(app.playback.current, performance.now());
+      if (app.playback.current) savePosition(app.playback.current);
       history.replaceState(history.state, "", switchLanguage(location.href));
       location.reload();
     },
@@ -63,20 +63,20 @@ export function createUserActions(app: AppParts): UserActions {
       if (!confirm(translate('Remove "{name}" from the library?', { name: motion.name }))) return;
       app.library.remove(motion.id).catch((error: unknown) => showProblem(app.page.library, motion.name, error));
     },
-    toggle: (limb) => app.limbController.toggleClaim(limb),
-    ask: (limb) => app.limbController.requestLimb(limb),
-    withdraw: (limb) => app.limbController.withdrawRequest(limb),
-    give: (limb) => app.limbController.handOver(limb),
-    select: (limb) => app.stageHost.controller?.velocity.hold(limb),
+    toggle: (limb) => app.limbs.act("toggle", limb),
+    ask: (limb) => app.limbs.act("ask", limb),
+    withdraw: (limb) => app.limbs.act("withdraw", limb),
+    give: (limb) => app.limbs.act("give", limb),
+    select: (limb) => app.limbs.act("hold", limb),
     press: (input, down) => {
-      const commands = app.stageHost.controller?.commands;
-      if (down) commands?.press(`page ${input}`, [input], 1, performance.now());
-      else commands?.release(`page ${input}`, performance.now());
+      const { commands } = app.limbs;
+      if (down) commands.press(`page ${input}`, [input], 1, performance.now());
+      else commands.release(`page ${input}`, performance.now());
     },
     mapping: (mapping) => app.setMapping(mapping),
-    focus: (limb) => (app.stageHost.focusedLimb = limb),
-    dancer: (performer) => app.limbController.selectedPerformer.select(performer),
-    nextDancer: () => app.limbController.selectNextPerformer(),
+    focus: (limb) => app.limbs.focus(limb),
+    dancer: (performer) => app.limbs.selectPerformer(performer),
+    nextDancer: () => app.limbs.selectPerformer("next"),
     reframe: () => app.stageHost.resize(),
     ...(pageAccess.allows("ingest") ? { keep: createPageRecordAction(app) } : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
@@ -96,9 +96,9 @@ export function createUserActions(app: AppParts): UserActions {
 /** Return the actions of keys, mouse buttons and gamepad, other than claiming and moving limbs. */
 export function createKeyActions(app: AppParts): PageActions {
   return {
-    next_dancer: () => app.limbController.selectNextPerformer(),
-    ask: () => app.limbController.requestLimb(),
-    give: () => app.limbController.handOver(),
+    next_dancer: () => app.limbs.selectPerformer("next"),
+    ask: () => app.limbs.act("ask"),
+    give: () => app.limbs.act("give"),
     play: () => app.playback.togglePlaying(),
     back: () => app.playback.current?.seekByBlocks(-1, performance.now()),
     forward: () => app.playback.current?.seekByBlocks(1, performance.now()),
@@ -127,7 +127,8 @@ function savePicture({ exporter, library }: AppParts): void {
 
 function createPageRecordAction(app: AppParts): () => Promise<void> {
   return createRecordAction({
-    record: (session, name) => recordSession(session, { name, camera: recordedCameraKeyframes(app) }),
+    record: (session, name) =>
+      app.stageHost.cameraKeyframes().then((camera) => recordSession(session, { name, camera })),
     toast: (message, ...actions) => app.page.toast(message, ...actions),
     session: () => {
       const { current } = app.playback;
@@ -141,12 +142,4 @@ function createPageRecordAction(app: AppParts): () => Promise<void> {
       app.page.library.showDownloads(motion);
     },
   });
-}
-
-/** Return the camera's movement during the last loop of the motion; empty if the camera was not moved. */
-function recordedCameraKeyframes({ playback: { current }, stageHost: { stage } }: AppParts): CameraKeyframe[] {
-  const clock = current?.viewer.clockTime(performance.now()) ?? null;
-  return current && clock !== null
-    ? (stage?.cameraRecorder.movedKeyframes(clock - current.viewer.duration * 1e6) ?? [])
-    : [];
 }

@@ -1,6 +1,6 @@
 /** Plays the sound of a motion in sync with the stage, and reports the stage time that is heard. */
 
-import type { AudioBlockStore } from "../playout/audio-store";
+import type { AudioTrack } from "../codec/audio";
 import type { LeaderTime } from "../playout/presentation-clock";
 import type { TimelineHistory } from "../playout/timeline";
 import { spansBetween, type TimelineSpan } from "../playout/timeline-span";
@@ -29,9 +29,16 @@ const POSITION_TOLERANCE_US = 10;
 /** Time constant of a cut, in seconds. */
 const FADE_TIME_CONSTANT_S = 0.003;
 
+/** Encoded packets of one audio track. */
+export interface AudioPackets {
+  readonly track: AudioTrack;
+  /** Return the bytes of packet `number`, or null if they were not received. */
+  packet(number: number): Uint8Array | null;
+}
+
 /** Source of the sound, and its clock. */
 export interface PlaybackSource {
-  readonly store: AudioBlockStore;
+  readonly store: AudioPackets;
   readonly timelines: TimelineHistory;
   /** True if the stage time is known well enough to start. */
   isClockSettled(): boolean;

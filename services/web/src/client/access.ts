@@ -54,6 +54,11 @@ export class Access {
     return this.#token !== null;
   }
 
+  /** Token, null without one. */
+  get token(): string | null {
+    return this.#token;
+  }
+
   /** Role of the token, "admin" without one. */
   get role(): Role {
     return this.#claims.role;

@@ -110,6 +110,20 @@ export function editSession(id: string, edit: SessionEdit, access = pageAccess):
   return requestJson("PATCH", `/v1/sessions/${encodeURIComponent(id)}`, edit, access) as Promise<Session>;
 }
 
+/**
+ * Return the first running session. If there is none and `access` allows it, create one that plays the newest motion.
+ * Returns null if there is no session and none can be created.
+ */
+export async function findOrCreateSession(
+  newestMotion: Promise<string | null>,
+  access = pageAccess,
+): Promise<Session | null> {
+  const { items } = await listSessions(undefined, access);
+  if (items.length > 0) return items[0];
+  const motion = access.allows("control") ? await newestMotion : null;
+  return motion ? createSession(motion) : null;
+}
+
 /** Record a session as a new motion; resolves after some seconds of work, when the motion can be played. */
 export function recordSession(session: string, recording: Recording = {}): Promise<Motion> {
   return requestJson("POST", `/v1/sessions/${encodeURIComponent(session)}/recordings`, recording) as Promise<Motion>;

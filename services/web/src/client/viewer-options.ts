@@ -14,4 +14,6 @@ export interface ViewerOptions {
   solver?: SolverFactory | null;
   /** Server and credentials; those of the page by default. */
   access?: Access;
+  /** Return true while nobody sees the stage; by default while the page is in the background. */
+  isHidden?: () => boolean;
 }

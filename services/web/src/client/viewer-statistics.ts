@@ -45,6 +45,8 @@ export interface StatisticsSources {
   /** True if the URL sets the bitrate level. */
   readonly isPinned: boolean;
   readonly translator: Translator;
+  /** Return true while nobody sees the stage. */
+  readonly isHidden: () => boolean;
 }
 
 /** Collector of a viewer's measurements. Durations are moving averages in milliseconds. */
@@ -103,7 +105,7 @@ export class StatisticsCollector {
       buffer: Math.round(bufferedUs),
       decode: Math.round(this.decodeMs * 1000),
       frame: Math.round(this.frameMs * 1000),
-      hidden: typeof document !== "undefined" && document.hidden,
+      hidden: this.sources.isHidden(),
     };
   }
 }

@@ -77,6 +77,7 @@ export class Viewer extends EventTarget {
       startedAt: this.now(),
       isPinned: this.url.searchParams.has("rate"),
       translator: access.translator,
+      isHidden: options.isHidden ?? (() => typeof document !== "undefined" && document.hidden),
     });
     this.connection = new ReconnectingConnection({
       url: () => access.authorizeSocketUrl(this.makeUrl()),
@@ -161,6 +162,11 @@ export class Viewer extends EventTarget {
   /** Blocks of the motion's audio, null if it has none. */
   get audio(): AudioBlockStore | null {
     return this.tracks?.audio ?? null;
+  }
+
+  /** True once the clock estimate will change little. */
+  get isClockSettled(): boolean {
+    return this.clock.isSettled;
   }
 
   /** Return the position in the motion at local `nowMs`, seconds. */

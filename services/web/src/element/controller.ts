@@ -1,11 +1,12 @@
 /** Controller of one `<bunraku-stage>`, from the insertion of the element into a document until its removal. */
-import { ClaimController } from "../app/claim-controller";
-import { findOrCreateSession, Playback } from "../app/playback";
 import { SoundController } from "../app/sound-controller";
 import type { SoundPreferenceStore } from "../audio/preference";
 import { Access, tabToken } from "../client/access";
+import { findOrCreateSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import { diagnoseUnreachable } from "../client/server-diagnosis";
+import { ClaimController } from "../engine/claim-controller";
+import { Playback } from "../engine/playback";
 import type { Translator } from "../i18n/translator";
 import { resolveDisplayName } from "../ui/display-name";
 import { ElementRenderer } from "./renderer";
@@ -57,12 +58,16 @@ export class ElementController {
     const { toast, limbRequests } = this.#view;
     this.#limbController = new ClaimController(
       {
-        limbRequests,
-        toast,
-        strings: {
-          render: (limbs, ready, selected) => this.#view.renderLimbs(limbs, this.#canClaimLimbs, ready, selected),
-          notice: (text) => toast(text),
+        render: ({ limbs, isReady, performer, giveKey }) => {
+          this.#view.renderLimbs(limbs, this.#canClaimLimbs, isReady, performer);
+          limbRequests.render(limbs, giveKey);
         },
+        toast: (message, offer) => {
+          if (!offer) return toast(message);
+          const { label, key, limb } = offer;
+          toast(message, { label, key, run: () => this.#limbController.requestLimb(limb) });
+        },
+        notice: (text) => toast(text),
       },
       () => this.renderer.mapping,
       translator,

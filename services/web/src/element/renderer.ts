@@ -1,10 +1,13 @@
 /** Rendering of an embedded stage, in the size of its element and while the element is visible. */
-import type { ClaimController } from "../app/claim-controller";
-import type { Playback } from "../app/playback";
-import type { StageController } from "../app/stage-controller";
+import type { ClaimController } from "../engine/claim-controller";
+import type { Playback } from "../engine/playback";
+import type { StageController } from "../engine/stage-controller";
 import type { PageActions } from "../input/command-dispatcher";
+import { listenToKeyboard } from "../input/keyboard";
 import { ACTIONS, type Mapping } from "../input/mapping";
 import { loadMapping } from "../input/mapping-store";
+import { listenToMouse } from "../input/mouse";
+import { listenToPointer, showPointerState } from "../input/pointer-events";
 import type { Theme } from "../stage/scenery/look";
 import type { ElementView } from "./view";
 
@@ -70,7 +73,7 @@ export class ElementRenderer {
 
   /** Load the renderer and start drawing. Returns the reason if that is not possible. */
   async start(keyActions: ElementKeyActions): Promise<"not loaded" | "no graphics" | null> {
-    const chunk = await import("../app/stage-chunk").catch(() => null);
+    const chunk = await import("../engine/stage-chunk").catch(() => null);
     if (this.#closed) return null;
     if (!chunk) return "not loaded";
     const { canvas, frame } = this.view;
@@ -88,12 +91,18 @@ export class ElementRenderer {
     } catch {
       return "no graphics";
     }
-    const { stage, commands, velocity } = this.stageController;
+    const { stage, commands, pointer, velocity } = this.stageController;
     stage.reducedMotion = this.#still;
     stage.setTheme(this.#theme);
     const getMapping = () => (this.#controls ? this.mapping : { ...this.mapping, bindings: {} });
-    chunk.listenToKeyboard(frame, commands, velocity, getMapping, { showKeys: ignore, onEscape: ignore });
-    chunk.listenToMouse(canvas, frame, commands, getMapping);
+    const showPointer = () =>
+      showPointerState(canvas, { isPointerNear: pointer.hoveredLimb !== null, isPulling: pointer.isDragging });
+    listenToPointer(canvas, (message) => {
+      pointer.handle(message);
+      showPointer();
+    });
+    listenToKeyboard(frame, commands, velocity, getMapping, { showKeys: ignore, onEscape: ignore });
+    listenToMouse(canvas, frame, commands, getMapping);
     // A finger on a ring drags the limb; elsewhere it scrolls the page.
     canvas.addEventListener("touchstart", (event) => "pulling" in canvas.dataset && event.preventDefault(), {
       passive: false,

@@ -1,6 +1,7 @@
 /** Parsing of the `src` attribute: server, session or motion, and access token. Pure. */
-import type { PlaybackKind } from "../app/playback";
+
 import { parseUrlToken } from "../client/access";
+import type { PlaybackKind } from "../engine/playback";
 
 export interface StageAddress {
   /** Origin of the server, `http(s)://host`. */

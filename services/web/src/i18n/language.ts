@@ -23,11 +23,14 @@ export function selectLanguage(
 
 /** Load the page's language. Call this before any text is shown. Falls back to English if Japanese cannot be loaded. */
 export async function loadPageLanguage(query: URLSearchParams): Promise<Language> {
-  const japanese =
-    selectLanguage(query.get("lang"), browserStorage.get(STORAGE_KEY), navigator.languages) === "ja" &&
-    (await loadJapaneseMessages());
-  if (japanese) setPageLanguage("ja", japanese);
+  await loadLanguage(selectLanguage(query.get("lang"), browserStorage.get(STORAGE_KEY), navigator.languages));
   return pageLanguage();
+}
+
+/** Load the translations of a language and use them from now on. Falls back to English if they cannot be loaded. */
+export async function loadLanguage(language: Language): Promise<void> {
+  const japanese = language === "ja" && (await loadJapaneseMessages());
+  if (japanese) setPageLanguage("ja", japanese);
 }
 
 /** Return a Japanese translator for an embedded element; an English one if the translations cannot be loaded. */

@@ -14,6 +14,21 @@ const LONG_PRESS_MS = 400;
 /** Functions of the page for the actions that claim no limb. */
 export type PageActions = Readonly<Record<Exclude<Action, `take_${string}`>, () => void>>;
 
+/** Commands of the controls of all devices. */
+export interface CommandInput {
+  isDown(control: Control): boolean;
+  /**
+   * Press a control, or change the strength of the press. `now` is in milliseconds. Return whether any command in
+   * `bound` applies now.
+   */
+  press(control: Control, bound: readonly Command[], strength: number, now: number): boolean;
+  /** Handle automatic repetition: seeking repeats, other commands do not. */
+  repeat(control: Control): void;
+  release(control: Control, now: number): void;
+  /** Release all controls that match, without the effect of a tap. */
+  releaseAll(matches?: (control: Control) => boolean): void;
+}
+
 interface Press {
   commands: readonly Command[];
   pressedAt: number;
@@ -25,7 +40,7 @@ interface Press {
   claimedLimbs: readonly number[];
 }
 
-export class CommandDispatcher {
+export class CommandDispatcher implements CommandInput {
   readonly #pressed = new Map<Control, Press>();
 
   constructor(
@@ -38,10 +53,6 @@ export class CommandDispatcher {
     return this.#pressed.has(control);
   }
 
-  /**
-   * Press a control, or change the strength of the press. `now` is in milliseconds. Return whether any command in
-   * `bound` applies now.
-   */
   press(control: Control, bound: readonly Command[], strength: number, now: number): boolean {
     const pressed = this.#pressed.get(control);
     const commands = pressed?.commands ?? activeCommands(bound, this.velocity.selectedLimb !== null);
@@ -61,7 +72,6 @@ export class CommandDispatcher {
     return true;
   }
 
-  /** Handle automatic repetition: seeking repeats, other commands do not. */
   repeat(control: Control): void {
     for (const command of this.#pressed.get(control)?.commands ?? [])
       if (command === "back" || command === "forward") this.actions[command]();
@@ -77,7 +87,6 @@ export class CommandDispatcher {
     for (const limb of press.limbs) if (long || !press.claimedLimbs.includes(limb)) this.velocity.release(limb);
   }
 
-  /** Release all controls that match, without the effect of a tap. */
   releaseAll(matches: (control: Control) => boolean = () => true): void {
     for (const [control, press] of this.#pressed) {
       if (!matches(control)) continue;

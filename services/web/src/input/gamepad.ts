@@ -1,5 +1,5 @@
 /** Polls the first standard gamepad and dispatches the commands of its controls. */
-import type { CommandDispatcher } from "./command-dispatcher";
+import type { CommandInput } from "./command-dispatcher";
 import { resolveControls } from "./gamepad-state";
 import { type Control, isPadControl, type Mapping } from "./mapping";
 import { OneEuro, smoothingSettings } from "./one-euro";
@@ -18,7 +18,7 @@ export interface GamepadInput {
 }
 
 export function createGamepadInput(
-  commands: CommandDispatcher,
+  commands: CommandInput,
   mapping: () => Mapping,
   pads: () => readonly (Gamepad | null)[],
 ): GamepadInput {

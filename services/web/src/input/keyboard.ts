@@ -1,7 +1,6 @@
 /** Keyboard input: the bound keys, and the fixed keys Escape and ?. */
-import type { CommandDispatcher } from "./command-dispatcher";
+import type { CommandInput } from "./command-dispatcher";
 import { isPadControl, type Mapping } from "./mapping";
-import type { VelocityInputs } from "./velocity-input";
 
 export interface KeyboardActions {
   /** Show the key bindings. */
@@ -10,11 +9,14 @@ export interface KeyboardActions {
   onEscape(): void;
 }
 
-/** Listen to the keys of a window, or of an element that contains the focus. */
+/**
+ * Listen to the keys of a window, or of an element that contains the focus. `limbs` releases all held limbs and returns
+ * whether there were any.
+ */
 export function listenToKeyboard(
   target: GlobalEventHandlers,
-  commands: CommandDispatcher,
-  velocity: VelocityInputs,
+  commands: CommandInput,
+  limbs: { releaseAll(): boolean },
   mapping: () => Mapping,
   actions: KeyboardActions,
 ): void {
@@ -37,7 +39,7 @@ export function listenToKeyboard(
     }
     if (event.repeat) return false;
     if (code === "Escape") {
-      if (!velocity.releaseAll()) actions.onEscape();
+      if (!limbs.releaseAll()) actions.onEscape();
       return true;
     }
     if (event.key === "?") {

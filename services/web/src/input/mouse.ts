@@ -2,7 +2,7 @@
  * Additional mouse buttons and the wheel on the stage, with their bindings. The primary button drags and turns
  * (`pointer.ts`).
  */
-import type { CommandDispatcher } from "./command-dispatcher";
+import type { CommandInput } from "./command-dispatcher";
 import type { Control, Mapping } from "./mapping";
 
 /** Duration of the press that a notch of the wheel stands for, in milliseconds. */
@@ -21,7 +21,7 @@ export function controlOfEvent(event: MouseEvent): Control | null {
 export function listenToMouse(
   canvas: HTMLElement,
   window: EventTarget,
-  commands: CommandDispatcher,
+  commands: CommandInput,
   mapping: () => Mapping,
 ): void {
   let wheelTimer: ReturnType<typeof setTimeout> | undefined;

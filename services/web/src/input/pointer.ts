@@ -1,4 +1,4 @@
-/** Mouse and touch on the stage: dragging a handle pulls its limb, dragging anything else turns the view. */
+/** Mouse and touch on the stage: dragging a handle pulls its limb, dragging anything else turns the view. Reads no DOM. */
 import { Vector3 } from "three";
 import type { Stage } from "../stage/stage";
 import { limbWithinPerformer, performerOfLimb } from "../wire/limbs";
@@ -16,7 +16,20 @@ const PULL_BETA = 12;
 const DEPTH_SPEED_M_PER_S = 0.7;
 const MAX_DEPTH_LAG_M = 0.15;
 
+/** Event of a pointer on the canvas. Positions are CSS pixels of the canvas, `now` is in milliseconds. */
+export interface PointerMessage {
+  /** `up` also stands for a cancelled pointer. */
+  readonly kind: "down" | "move" | "up" | "leave";
+  readonly pointerId: number;
+  readonly pointerType: string;
+  readonly button: number;
+  readonly x: number;
+  readonly y: number;
+  readonly now: number;
+}
+
 export interface PointerInput {
+  handle(message: PointerMessage): void;
   /** Limb under the pointer, highlighted; null for none. */
   readonly hoveredLimb: number | null;
   /** True if a limb is being dragged. */
@@ -57,7 +70,6 @@ export interface PointerOptions {
 }
 
 export function createPointerInput(
-  canvas: HTMLCanvasElement,
   stage: Stage,
   limbController: LimbController,
   { canClaim, onRefused, onClaimed, smoothing, depthInput }: PointerOptions,
@@ -68,11 +80,6 @@ export function createPointerInput(
   const handle = new Vector3();
   const handleAt = (limb: number) => stage.performers[performerOfLimb(limb)].handle(limbWithinPerformer(limb), handle);
 
-  /** Return the position of an event in the picture, in CSS pixels: the canvas may be anywhere in the page. */
-  const positionOf = (event: PointerEvent): { x: number; y: number } => {
-    const { left, top } = canvas.getBoundingClientRect();
-    return { x: event.clientX - left, y: event.clientY - top };
-  };
   const limbNear = (x: number, y: number): number | null => {
     let nearestLimb: number | null = null;
     let minDistance = GRAB_RADIUS_PX;
@@ -81,11 +88,6 @@ export function createPointerInput(
       if (distance < minDistance) [nearestLimb, minDistance] = [limb, distance];
     });
     return nearestLimb;
-  };
-  const highlight = (limb: number | null) => {
-    hoveredLimb = limb;
-    if (limb === null) delete canvas.dataset.near;
-    else canvas.dataset.near = "";
   };
   const pull = (drag: Drag, now: number) => {
     const { limb, x, y, dx, dy, filter } = drag;
@@ -115,12 +117,9 @@ export function createPointerInput(
     drag.updatedAt = now;
   };
 
-  canvas.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
-    const { pointerId } = event;
-    const { x, y } = positionOf(event);
+  const press = ({ pointerId, button, x, y, now }: PointerMessage) => {
+    if (button !== 0) return;
     const limb = limbNear(x, y);
-    canvas.setPointerCapture(pointerId);
     if (limb === null) {
       orbiting ??= { id: pointerId, x, y };
       return;
@@ -141,37 +140,34 @@ export function createPointerInput(
       filter: new OneEuro(3, { minCutoff: 1, beta: PULL_BETA, derivativeCutoff: 1 }),
       depthLead: 0,
       depth: 0,
-      updatedAt: event.timeStamp,
+      updatedAt: now,
     });
-    canvas.dataset.pulling = "";
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    const drag = drags.get(event.pointerId);
-    if (drag) {
-      Object.assign(drag, positionOf(event));
-      pull(drag, event.timeStamp);
-    } else if (orbiting?.id === event.pointerId) {
-      stage.audience.orbit(
-        (orbiting.x - event.clientX) * ORBIT_RAD_PER_PX,
-        (event.clientY - orbiting.y) * ORBIT_RAD_PER_PX,
-      );
-      orbiting = { id: event.pointerId, x: event.clientX, y: event.clientY };
-    } else if (event.pointerType !== "touch") {
-      const { x, y } = positionOf(event);
-      highlight(limbNear(x, y));
-    }
-  });
-  const end = (event: PointerEvent) => {
-    const drag = drags.get(event.pointerId);
-    drags.delete(event.pointerId);
-    if (drag && limbController.source(drag.limb) === "pointer") limbController.release(drag.limb);
-    if (orbiting?.id === event.pointerId) orbiting = null;
-    if (drags.size === 0) delete canvas.dataset.pulling;
   };
-  canvas.addEventListener("pointerup", end);
-  canvas.addEventListener("pointercancel", end);
-  canvas.addEventListener("pointerleave", () => highlight(null));
+  const move = ({ pointerId, pointerType, x, y, now }: PointerMessage) => {
+    const drag = drags.get(pointerId);
+    if (drag) {
+      Object.assign(drag, { x, y });
+      pull(drag, now);
+    } else if (orbiting?.id === pointerId) {
+      stage.audience.orbit((orbiting.x - x) * ORBIT_RAD_PER_PX, (y - orbiting.y) * ORBIT_RAD_PER_PX);
+      orbiting = { id: pointerId, x, y };
+    } else if (pointerType !== "touch") {
+      hoveredLimb = limbNear(x, y);
+    }
+  };
+  const release = ({ pointerId }: PointerMessage) => {
+    const drag = drags.get(pointerId);
+    drags.delete(pointerId);
+    if (drag && limbController.source(drag.limb) === "pointer") limbController.release(drag.limb);
+    if (orbiting?.id === pointerId) orbiting = null;
+  };
   return {
+    handle(message) {
+      if (message.kind === "down") press(message);
+      else if (message.kind === "move") move(message);
+      else if (message.kind === "up") release(message);
+      else hoveredLimb = null;
+    },
     get hoveredLimb() {
       return hoveredLimb;
     },

@@ -1,6 +1,6 @@
 /** Audio blocks that a viewer holds (`proto/codec.md`, 2.15). */
 
-import { type AudioTrack, unpackAudioBlock } from "../codec/audio";
+import { type AudioPacket, type AudioTrack, unpackAudioBlock } from "../codec/audio";
 import { DamagedBlock } from "../codec/errors";
 import { TrackBlockStore } from "./block-store";
 
@@ -11,6 +11,8 @@ interface AudioBlock {
 
 /** Encoded packets of one audio track, each at the highest level received. */
 export class AudioBlockStore extends TrackBlockStore<AudioTrack, AudioBlock> {
+  /** Called with the packets of each stored block. */
+  onPackets: (packets: readonly AudioPacket[]) => void = () => undefined;
   private readonly packets = new Map<number, Uint8Array>();
 
   /** Return the bytes of packet `number`, or null if they were not received. */
@@ -29,6 +31,7 @@ export class AudioBlockStore extends TrackBlockStore<AudioTrack, AudioBlock> {
     }
     // copied, so that the message that carried the packets can be freed
     for (const packet of packets) this.packets.set(packet.number, packet.data.slice());
+    this.onPackets(packets);
     return { frames: track.framesIn(index) };
   }
 }

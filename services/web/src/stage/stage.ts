@@ -13,6 +13,7 @@ import { type ScreenBox, unionOf, type WorldExtent } from "./camera/screen-box";
 import { type ScreenPosition, ScreenProjection } from "./camera/screen-projection";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
+import type { StageCanvas } from "./rendering/canvas";
 import { FrameRenderer } from "./rendering/frame-renderer";
 import { type Graphics, openGraphics } from "./rendering/graphics";
 import { BEST_QUALITY, type Quality } from "./rendering/quality";
@@ -69,7 +70,7 @@ export class Stage {
   #firstFrame: "pending" | "submitted" | "complete" = "pending";
 
   /** Create a stage that draws on `canvas`. Throw if the browser has no WebGL 2. */
-  constructor(canvas: HTMLCanvasElement, graphics: Graphics = openGraphics(canvas)) {
+  constructor(canvas: StageCanvas, graphics: Graphics = openGraphics(canvas)) {
     this.#frameRenderer = new FrameRenderer(canvas, graphics);
     this.renderer = this.#frameRenderer.renderer;
     this.#performerGroup = new PerformerGroup(this.#floorHeight);

@@ -1,5 +1,6 @@
 import { describe, expect, test } from "vitest";
 import { AvatarSlot, type AvatarSlotOptions, AvatarSlots } from "../../src/app/avatar-slot";
+import { AvatarModels } from "../../src/engine/avatar-models";
 import type { PerformerFactory } from "../../src/stage/puppet/performer-group";
 import type { AvatarState } from "../../src/ui/library/avatar-chooser";
 import { createFigureFile, type FigureOptions } from "../avatar/figure-files";
@@ -16,15 +17,17 @@ class FakeBrowser {
   readonly states: AvatarState[] = [];
   readonly toasts: string[] = [];
   readonly problems: string[][] = [];
+  /** Avatars of the page that was opened last. */
+  avatars = new AvatarModels();
   /** Factories that were set on the stage, and the performers that they were set for. */
   readonly factories: (PerformerFactory | null)[] = [];
   readonly performers: number[] = [];
 
   /** Open the page, with or without the stage. */
   open(withStage = true): AvatarSlot {
-    const slot = new AvatarSlot(this.options);
-    if (withStage) slot.stage = this.stage;
-    return slot;
+    this.avatars = new AvatarModels();
+    if (withStage) this.avatars.stage = this.stage;
+    return new AvatarSlot(this.options);
   }
 
   get options(): AvatarSlotOptions {
@@ -41,6 +44,7 @@ class FakeBrowser {
         },
         toast: (message) => void this.toasts.push(message),
       },
+      avatars: this.avatars,
       files: {
         get: async (key) => (this.readKeys.push(key), this.files.get(key) ?? null),
         put: async (key, file) => !this.storageFull && this.files.set(key, file) !== undefined,
@@ -95,7 +99,7 @@ describe("avatar of one performer", () => {
     await browser.open().load(file({ vrm: 1 }));
     const again = browser.open(false);
     await again.restore();
-    again.stage = browser.stage;
+    browser.avatars.stage = browser.stage;
     expect([browser.shown?.name, browser.shown?.active, browser.factories.at(-1) !== null]).toEqual([
       "Boxes",
       true,
@@ -139,7 +143,7 @@ describe("avatars of several performers", () => {
     const browser = new FakeBrowser();
     const selection = { performer: 1 };
     const slots = new AvatarSlots(browser.options, selection);
-    slots.stage = browser.stage;
+    browser.avatars.stage = browser.stage;
     expect(browser.states).toEqual([PUPPET, PUPPET, PUPPET, PUPPET]);
     await slots.selected.load(file({}, "second.glb"));
     expect(browser.states.map(({ name }) => name)).toEqual([null, "second", null, null]);
@@ -170,9 +174,10 @@ describe("avatars of several performers", () => {
     await before.selected.load(file({}, "first.glb"));
     selection.performer = 2;
     await before.selected.load(file({}, "third.glb"));
+    browser.avatars = new AvatarModels();
     const slots = new AvatarSlots(browser.options, selection);
     slots.restore(1);
-    slots.stage = browser.stage;
+    browser.avatars.stage = browser.stage;
     await expect.poll(() => browser.states[0].name).toBe("first");
     slots.restore(2);
     expect(browser.states[2]).toEqual(PUPPET);

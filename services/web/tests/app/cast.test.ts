@@ -1,6 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { addMotionToStage } from "../../src/app/cast";
-import type { Playback } from "../../src/app/playback";
+import type { RemotePlayback } from "../../src/app/remote-playback";
 import type { MotionItem } from "../../src/ui/library/motion-item";
 import { MotionList } from "../../src/ui/library/motion-list";
 
@@ -30,9 +30,13 @@ afterEach(() => void vi.unstubAllGlobals());
 /** Add a motion to a stage with this many performers, and return the motion list. */
 async function addToStage(item: MotionItem, performers: number): Promise<MotionList> {
   const motions = new MotionList();
-  const viewer = { motion: "a", performers: Array(performers).fill(null) };
-  const playback = { viewer, position: () => 1.25, edit: (edit: unknown) => edits.push(edit) };
-  await addMotionToStage(item, playback as unknown as Playback, motions, {
+  const playback = {
+    motion: "a",
+    performerCount: performers,
+    position: 1.25,
+    edit: (edit: unknown) => edits.push(edit),
+  };
+  await addMotionToStage(item, playback as unknown as RemotePlayback, motions, {
     problem: (...problem) => problems.push(problem),
   });
   return motions;

@@ -1,4 +1,3 @@
-import { Vector3 } from "three";
 import { expect, test } from "vitest";
 import { Invitation } from "../../src/app/invitation";
 
@@ -9,42 +8,35 @@ function createInvitation(stored: Record<string, string> = {}) {
     put: (key: string, text: string) => void (stored[key] = text),
   };
   const invitation = new Invitation({ invite: (point) => void shown.push(point) }, storage);
-  const stage = {
-    hand: new Vector3(1, 2, 3) as Vector3 | null,
-    nearerHand: () => stage.hand,
-    toScreen: ({ x, y }: Vector3) => ({ x: 100 * x, y: 100 * y }),
-  };
-  return { invitation, stage, shown, stored };
+  return { invitation, shown, stored };
 }
 
+const HAND = { x: 100, y: 200 };
+
 test("invitation is shown beside the nearer hand for six seconds, once", () => {
-  const { invitation, stage, shown, stored } = createInvitation();
-  invitation.update(50_000, stage);
-  invitation.update(56_000, stage);
-  expect(shown).toEqual([
-    { x: 100, y: 200 },
-    { x: 100, y: 200 },
-  ]);
-  invitation.update(56_001, stage);
-  invitation.update(56_020, stage);
+  const { invitation, shown, stored } = createInvitation();
+  invitation.update(50_000, HAND);
+  invitation.update(56_000, HAND);
+  expect(shown).toEqual([HAND, HAND]);
+  invitation.update(56_001, HAND);
+  invitation.update(56_020, HAND);
   expect(shown.slice(2)).toEqual([null]);
   const next = createInvitation(stored);
-  next.invitation.update(0, next.stage);
+  next.invitation.update(0, HAND);
   expect(next.shown).toEqual([]);
 });
 
 test("invitation ends when a limb is claimed, even before it was shown", () => {
-  const { invitation, stage, shown, stored } = createInvitation();
+  const { invitation, shown, stored } = createInvitation();
   invitation.finish();
   invitation.finish();
-  invitation.update(0, stage);
+  invitation.update(0, HAND);
   expect(shown).toEqual([null]);
   expect(Object.values(stored)).toEqual(["yes"]);
 });
 
 test("invitation is hidden without a visible hand", () => {
-  const { invitation, stage, shown } = createInvitation();
-  stage.hand = null;
-  invitation.update(0, stage);
+  const { invitation, shown } = createInvitation();
+  invitation.update(0, null);
   expect(shown).toEqual([null]);
 });

@@ -1,8 +1,8 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import type { Playback, PlaybackKind } from "../../src/app/playback";
+import { RemotePlayback } from "../../src/app/remote-playback";
 import { restorePosition, savePosition } from "../../src/app/saved-position";
-import { Viewer } from "../../src/client/viewer";
-import { FakeWebSocket } from "../client/fake-websocket";
+import type { EngineCommand } from "../../src/engine/message";
+import type { PlaybackKind } from "../../src/engine/playback";
 import { stubStorage } from "../storage/storage-stub";
 
 const TIMELINE = {
@@ -16,42 +16,31 @@ const TIMELINE = {
   duration: 30_000_000,
 } as const;
 
-let opened: Viewer[];
+beforeEach(() => stubStorage("sessionStorage"));
+afterEach(() => void vi.unstubAllGlobals());
 
-beforeEach(() => {
-  opened = [];
-  FakeWebSocket.install();
-  stubStorage("sessionStorage");
-});
-afterEach(() => {
-  for (const viewer of opened) viewer.close();
-  FakeWebSocket.remove();
-  vi.unstubAllGlobals();
-});
-
-/** Open a playback at position 12.5 s; return it with its connection. */
-function openPlayback(id: string, kind: PlaybackKind): { playback: Playback; socket: FakeWebSocket } {
-  const viewer = new Viewer({ url: `ws://stage/v1/${kind}/${id}/stream`, now: () => 0, solver: null });
-  opened.push(viewer);
-  const socket = FakeWebSocket.last;
-  socket.accept();
-  return { playback: { id, kind, viewer, position: () => 12.5 } as unknown as Playback, socket };
+/** Open a playback at position 12.5 s; return it with the commands that it sends. */
+function openPlayback(id: string, kind: PlaybackKind): { playback: RemotePlayback; commands: EngineCommand[] } {
+  const commands: EngineCommand[] = [];
+  const playback = new RemotePlayback(1, id, kind, (command) => commands.push(command));
+  playback.setTime({ now: 0, position: 12.5, ownTime: 0, isClockSettled: true });
+  return { playback, commands };
 }
 
 test("motion resumes at its saved position once", () => {
   const before = openPlayback("m", "motions");
-  before.socket.receive(TIMELINE);
-  savePosition(before.playback, 0);
+  before.playback.apply({ event: "timeline", timeline: TIMELINE });
+  savePosition(before.playback);
   const after = openPlayback("m", "motions");
   restorePosition(after.playback);
-  expect(after.socket.messagesOf("Edit")).toEqual([]);
-  after.socket.receive({ ...TIMELINE, playing: true, loop: false });
-  after.socket.receive({ ...TIMELINE, epoch: 2, position: 12_500_000 });
-  expect(after.socket.messagesOf("Edit")).toEqual([{ name: "Edit", playing: false, position: 12_500_000, loop: true }]);
+  expect(after.commands).toEqual([]);
+  after.playback.apply({ event: "timeline", timeline: { ...TIMELINE, playing: true, loop: false } });
+  after.playback.apply({ event: "timeline", timeline: { ...TIMELINE, epoch: 2, position: 12_500_000 } });
+  expect(after.commands).toEqual([{ type: "edit", change: { playing: false, position: 12_500_000, loop: true } }]);
   const later = openPlayback("m", "motions");
   restorePosition(later.playback);
-  later.socket.receive(TIMELINE);
-  expect(later.socket.messagesOf("Edit")).toEqual([]);
+  later.playback.apply({ event: "timeline", timeline: TIMELINE });
+  expect(later.commands).toEqual([]);
 });
 
 test("other motions and sessions ignore the saved position", () => {
@@ -60,11 +49,11 @@ test("other motions and sessions ignore the saved position", () => {
     ["sessions", "m"],
   ] as const) {
     const before = openPlayback("m", kind);
-    before.socket.receive(TIMELINE);
-    savePosition(before.playback, 0);
+    before.playback.apply({ event: "timeline", timeline: TIMELINE });
+    savePosition(before.playback);
     const after = openPlayback(next, kind);
     restorePosition(after.playback);
-    after.socket.receive(TIMELINE);
-    expect(after.socket.messagesOf("Edit"), kind).toEqual([]);
+    after.playback.apply({ event: "timeline", timeline: TIMELINE });
+    expect(after.commands, kind).toEqual([]);
   }
 });

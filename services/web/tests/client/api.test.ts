@@ -25,6 +25,33 @@ test("lists are requested page by page", async () => {
   expect(requests.map(([path]) => path)).toEqual(["/v1/motions", "/v1/motions?cursor=b%2Fc", "/v1/sessions"]);
 });
 
+/** Answer requests, given as "METHOD path", with these JSON values; return the list of requests. */
+function stubResponses(responses: Record<string, unknown>): string[] {
+  const requests: string[] = [];
+  vi.stubGlobal("fetch", async (path: string, { method }: RequestInit) => {
+    requests.push(`${method} ${path}`);
+    return new Response(JSON.stringify(responses[`${method} ${path}`]), { status: 200 });
+  });
+  return requests;
+}
+
+test("running session is found without waiting for the library", async () => {
+  stubResponses({ "GET /v1/sessions": { items: [{ id: "on" }, { id: "later" }], next: null } });
+  expect(await api.findOrCreateSession(new Promise(() => undefined))).toEqual({ id: "on" });
+});
+
+test("session of the newest motion is created if none is running", async () => {
+  const requests = stubResponses({ "GET /v1/sessions": { items: [], next: null }, "POST /v1/sessions": { id: "new" } });
+  expect(await api.findOrCreateSession(Promise.resolve("dance"))).toEqual({ id: "new" });
+  expect(requests).toEqual(["GET /v1/sessions", "POST /v1/sessions"]);
+});
+
+test("no session is created without a motion", async () => {
+  const requests = stubResponses({ "GET /v1/sessions": { items: [], next: null } });
+  expect(await api.findOrCreateSession(Promise.resolve(null))).toBeNull();
+  expect(requests).toEqual(["GET /v1/sessions"]);
+});
+
 test("sessions are created and edited with JSON", async () => {
   const requests = stubResponse(200, '{"id": "s"}');
   await api.createSession("m");

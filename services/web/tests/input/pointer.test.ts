@@ -2,6 +2,7 @@ import { Vector3 } from "three";
 import { beforeEach, expect, test } from "vitest";
 import type { LimbController } from "../../src/input/limb-controller";
 import { createPointerInput, type PointerInput } from "../../src/input/pointer";
+import { listenToPointer, showPointerState } from "../../src/input/pointer-events";
 import type { Puppet } from "../../src/stage/puppet/puppet";
 import type { Stage } from "../../src/stage/stage";
 import { createStandingPuppet } from "../stage/puppet/figures";
@@ -17,6 +18,10 @@ class Canvas extends EventTarget {
   /** Position in the page, in pixels. */
   corner = { left: 0, top: 0 };
   setPointerCapture(): void {}
+  toggleAttribute(name: string, on: boolean): void {
+    if (on) this.dataset[name.replace("data-", "")] = "";
+    else delete this.dataset[name.replace("data-", "")];
+  }
   getBoundingClientRect(): { left: number; top: number } {
     return this.corner;
   }
@@ -68,12 +73,17 @@ beforeEach(() => {
     audience: { orbit: () => undefined },
   };
   limbController = createLimbController(performers, session);
-  pointer = createPointerInput(canvas as unknown as HTMLCanvasElement, stage as unknown as Stage, limbController, {
+  pointer = createPointerInput(stage as unknown as Stage, limbController, {
     canClaim: () => free,
     onRefused: (limb) => refused.push(limb),
     onClaimed: (limb) => claimed.push(limb),
     smoothing: () => smoothing,
     depthInput: () => depthInput,
+  });
+  const target = canvas as unknown as HTMLCanvasElement;
+  listenToPointer(target, (message) => {
+    pointer.handle(message);
+    showPointerState(target, { isPointerNear: pointer.hoveredLimb !== null, isPulling: pointer.isDragging });
   });
 });
 

@@ -2,6 +2,7 @@
 import { Matrix4, Quaternion, type SkinnedMesh, Texture, Vector3 } from "three";
 import type { PuppetModel } from "../../export/glb";
 import { type Figure, JOINTS } from "../../motion/skeleton";
+import { encodePng } from "../rendering/canvas";
 import { PATTERN } from "./finish";
 import { Puppet } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
@@ -52,8 +53,7 @@ export function createPuppetModel(figure: Figure): PuppetModel {
 /** Return the face texture as PNG. */
 export async function renderFacePng(): Promise<Uint8Array<ArrayBuffer>> {
   const texture = createFaceTexture();
-  const canvas = texture.image as HTMLCanvasElement;
-  const picture = await new Promise<Blob | null>((done) => canvas.toBlob(done, "image/png"));
+  const picture = await encodePng(texture.image);
   texture.dispose();
   if (!picture) throw new Error("The browser could not encode the puppet's face as PNG.");
   return new Uint8Array(await picture.arrayBuffer());

@@ -2,16 +2,16 @@
  * The two textures of the puppet, drawn once on a canvas: the face, and the asanoha (hemp leaf) pattern of the cloth.
  */
 import { CanvasTexture, RepeatWrapping, SRGBColorSpace } from "three";
+import { createCanvas, type StageCanvas } from "../rendering/canvas";
 
 type Point = readonly [x: number, y: number];
+type Context2D = CanvasRenderingContext2D | OffscreenCanvasRenderingContext2D;
 
-function createCanvas(size: number): CanvasRenderingContext2D {
-  const element = document.createElement("canvas");
-  element.width = element.height = size;
+function createContext(size: number): Context2D {
   // In software, since the graphics processor is preparing the stage at that time.
-  const context = element.getContext("2d", { willReadFrequently: true });
+  const context = createCanvas(size, size).getContext("2d", { willReadFrequently: true });
   if (!context) throw new Error("The browser has no 2D canvas context for the puppet's textures.");
-  return context;
+  return context as Context2D;
 }
 
 const FACE_TEXTURE_PX = 1024;
@@ -21,7 +21,7 @@ const toPixelY = (y: number) => (0.5 - y / 0.26) * FACE_TEXTURE_PX;
 
 /** Draw a brush stroke along a quadratic curve, with half widths at start, middle and end. */
 function drawStroke(
-  context: CanvasRenderingContext2D,
+  context: Context2D,
   [a, b, c]: readonly [Point, Point, Point],
   [wa, wb, wc]: readonly [number, number, number],
   ink: string,
@@ -43,14 +43,7 @@ function drawStroke(
   context.fill();
 }
 
-function drawBlush(
-  context: CanvasRenderingContext2D,
-  x: number,
-  y: number,
-  radius: number,
-  rgb: string,
-  strength: number,
-): void {
+function drawBlush(context: Context2D, x: number, y: number, radius: number, rgb: string, strength: number): void {
   const soft = context.createRadialGradient(toPixelX(x), toPixelY(y), 2, toPixelX(x), toPixelY(y), radius);
   soft.addColorStop(0, `rgba(${rgb},${strength})`);
   soft.addColorStop(1, `rgba(${rgb},0)`);
@@ -59,8 +52,8 @@ function drawBlush(
 }
 
 /** Create the face texture, which multiplies the colour of the gofun. */
-export function createFaceTexture(): CanvasTexture {
-  const context = createCanvas(FACE_TEXTURE_PX);
+export function createFaceTexture(): CanvasTexture<StageCanvas> {
+  const context = createContext(FACE_TEXTURE_PX);
   context.fillStyle = "#fff";
   context.fillRect(0, 0, FACE_TEXTURE_PX, FACE_TEXTURE_PX);
   for (const s of [1, -1]) {
@@ -123,7 +116,7 @@ export function createFaceTexture(): CanvasTexture {
   return texture;
 }
 
-function drawEye(context: CanvasRenderingContext2D, s: number): void {
+function drawEye(context: Context2D, s: number): void {
   context.save();
   context.beginPath();
   context.moveTo(toPixelX(s * 0.0135), toPixelY(0.0015));
@@ -144,7 +137,7 @@ function drawEye(context: CanvasRenderingContext2D, s: number): void {
   context.restore();
 }
 
-function drawLips(context: CanvasRenderingContext2D): void {
+function drawLips(context: Context2D): void {
   const to = (cx: number, cy: number, x: number, y: number) =>
     context.quadraticCurveTo(toPixelX(cx), toPixelY(cy), toPixelX(x), toPixelY(y));
   context.fillStyle = "#cc4a34";
@@ -168,8 +161,8 @@ function drawLips(context: CanvasRenderingContext2D): void {
 }
 
 /** Create a tile of white hemp-leaf lines on black. */
-export function createAsanohaTexture(): CanvasTexture {
-  const context = createCanvas(512);
+export function createAsanohaTexture(): CanvasTexture<StageCanvas> {
+  const context = createContext(512);
   context.fillStyle = "#000";
   context.fillRect(0, 0, 512, 512);
   context.strokeStyle = "#fff";

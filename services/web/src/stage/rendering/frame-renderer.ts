@@ -2,6 +2,7 @@
 import { ACESFilmicToneMapping, PCFShadowMap, type PerspectiveCamera, type Scene, Vector2, WebGLRenderer } from "three";
 import type { ScreenBox } from "../camera/screen-box";
 import type { Look } from "../scenery/look";
+import type { StageCanvas } from "./canvas";
 import { EdgeSmoothing } from "./edge-smoothing";
 import { FrameFence } from "./frame-fence";
 import type { Graphics } from "./graphics";
@@ -32,7 +33,7 @@ export class FrameRenderer {
   readonly #intervals: number[] = [];
   #isTakingPicture = false;
 
-  constructor(canvas: HTMLCanvasElement, { context, quality }: Graphics) {
+  constructor(canvas: StageCanvas, { context, quality }: Graphics) {
     this.#quality = quality;
     this.#fence = new FrameFence(context);
     this.#smoothing = context.getContextAttributes()?.antialias ? null : new EdgeSmoothing();

@@ -2,6 +2,7 @@
  * Opens the graphics context of a canvas separately from the stage: it takes the browser some time, which on a slow
  * connection overlaps with the download of the stage, and it does not wait for what the page has painted before.
  */
+import { createCanvas, type StageCanvas } from "./canvas";
 import { AdaptiveQuality } from "./quality";
 
 export interface Graphics {
@@ -14,12 +15,12 @@ export interface Graphics {
  * Open the context of `canvas`. `pinQuality` keeps the best quality on any machine, for screenshots. Throw if the
  * browser has no WebGL 2.
  */
-export function openGraphics(canvas: HTMLCanvasElement, pinQuality = false): Graphics {
+export function openGraphics(canvas: StageCanvas, pinQuality = false): Graphics {
   const quality = new AdaptiveQuality(rendererName(), pinQuality);
   const context = canvas.getContext("webgl2", {
     antialias: !quality.quality.simpleMaterials,
     powerPreference: "high-performance",
-  });
+  }) as WebGL2RenderingContext | null;
   if (!context) throw new Error("The browser does not support WebGL 2.");
   return { context, quality };
 }
@@ -29,7 +30,7 @@ export function openGraphics(canvas: HTMLCanvasElement, pinQuality = false): Gra
  * context.
  */
 function rendererName(): string {
-  const context = document.createElement("canvas").getContext("webgl2");
+  const context = createCanvas(1, 1).getContext("webgl2") as WebGL2RenderingContext | null;
   if (!context) throw new Error("The browser does not support WebGL 2.");
   const debugInfo = context.getExtension("WEBGL_debug_renderer_info");
   const name = debugInfo ? String(context.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : "";

@@ -2,6 +2,7 @@
 import { ACESFilmicToneMapping, PCFShadowMap, type PerspectiveCamera, type Scene, WebGLRenderer } from "three";
 import { createEnvironmentMap } from "../scenery/environment-map";
 import type { Look } from "../scenery/look";
+import { createCanvas, encodePng } from "./canvas";
 
 /** Minimum width and maximum side of an image, in pixels. */
 const MIN_WIDTH_PX = 1600;
@@ -25,7 +26,7 @@ export class PictureRenderer {
   ): Promise<Blob> {
     // One renderer for all images: browsers allow few contexts, and release them late.
     if (!this.#renderer || this.#renderer.getContext().isContextLost())
-      this.#renderer = new WebGLRenderer({ antialias: true });
+      this.#renderer = new WebGLRenderer({ canvas: createCanvas(1, 1), antialias: true });
     const renderer = this.#renderer;
     renderer.toneMapping = ACESFilmicToneMapping;
     renderer.toneMappingExposure = look.exposure;
@@ -41,8 +42,8 @@ export class PictureRenderer {
       scene.environment = previousEnvironment;
       environment.dispose();
     }
-    // The drawing buffer is cleared after this task, but toBlob has copied it by then.
-    const picture = new Promise<Blob | null>((done) => renderer.domElement.toBlob(done, "image/png"));
+    // The drawing buffer is cleared after this task, but the encoder has copied it by then.
+    const picture = encodePng(renderer.domElement);
     renderer.setSize(1, 1, false);
     const png = await picture;
     if (!png) throw new Error("The browser could not encode the picture of the stage as PNG.");

@@ -6,8 +6,6 @@ import { PerformerSelection } from "../input/performer-selection";
 import type { VelocityInputs } from "../input/velocity-input";
 import { type LimbState, limbHolders, limbName, limbRequesters, limbsInKeyOrder } from "../ui/limb-state";
 import { controlName } from "../ui/mapping/control-name";
-import type { ShowToast } from "../ui/notification/toast";
-import type { Page } from "../ui/page";
 import { limbNumber } from "../wire/limbs";
 import type { Playback } from "./playback";
 
@@ -19,12 +17,32 @@ export interface StageInputs {
   shakeRing(limb: number): void;
 }
 
-/** Parts of the page, or of the embedded element, that show the state of the limbs. */
-export interface LimbControllerView {
-  readonly toast: ShowToast;
-  readonly strings: Pick<Page["strings"], "render" | "notice">;
-  readonly limbRequests: Page["limbRequests"];
-  readonly library?: { readonly danceAs: Pick<Page["library"]["danceAs"], "dancers"> };
+/** Limbs of all performers as the controls show them. */
+export interface ClaimState {
+  readonly limbs: readonly LimbState[];
+  /** True if limbs can be claimed now. */
+  readonly isReady: boolean;
+  /** Performer whose limbs keys, gamepad and page controls act on. */
+  readonly performer: number;
+  /** Name of the key that hands a limb over, if there is one. */
+  readonly giveKey: string | null;
+}
+
+/** Offer to ask the holder of a limb for it. */
+export interface AskOffer {
+  readonly limb: number;
+  readonly label: string;
+  /** Name of the key that does the same, if there is one. */
+  readonly key: string | null;
+}
+
+/** Display of the page, or of the embedded element. */
+export interface ClaimView {
+  render(state: ClaimState): void;
+  /** Show a brief message, perhaps with the offer to ask for a limb. */
+  toast(message: string, offer?: AskOffer): void;
+  /** Show a notice of the session about an input. */
+  notice(text: string): void;
 }
 
 export class ClaimController {
@@ -39,7 +57,7 @@ export class ClaimController {
   #contestedLimb: number | null = null;
 
   constructor(
-    private readonly view: LimbControllerView,
+    private readonly view: ClaimView,
     private readonly getMapping: () => Mapping,
     private readonly translator = pageTranslator,
   ) {}
@@ -79,9 +97,7 @@ export class ClaimController {
       );
       this.render();
     });
-    on<{ detail: string }>("notice", ({ detail }) =>
-      this.view.strings.notice(this.translator.translateServerText(detail)),
-    );
+    on<{ detail: string }>("notice", ({ detail }) => this.view.notice(this.translator.translateServerText(detail)));
   }
 
   /** Return the state of all performers' limbs. Claims of this page are shown before the session confirms them. */
@@ -118,14 +134,12 @@ export class ClaimController {
   }
 
   render(): void {
-    const limbs = this.limbStates();
-    this.view.strings.render(
-      limbs,
-      this.connected && this.#playback !== null && !this.viewOnly,
-      this.selectedPerformer.performer,
-    );
-    this.view.limbRequests.render(limbs, this.#keyHint("give"));
-    this.view.library?.danceAs.dancers(limbs, this.selectedPerformer.performer);
+    this.view.render({
+      limbs: this.limbStates(),
+      isReady: this.connected && this.#playback !== null && !this.viewOnly,
+      performer: this.selectedPerformer.performer,
+      giveKey: this.#keyHint("give"),
+    });
   }
 
   /** Select the next performer, and announce it: the change is hard to see on the stage. */
@@ -172,15 +186,15 @@ export class ClaimController {
     } else {
       this.#contestedLimb = limb;
       this.view.toast(this.translator.translate("{name} holds the {limb}", { name: holder.name, limb: name }), {
+        limb,
         label: this.translator.translate("Ask"),
         key: this.#keyHint("ask"),
-        run: () => this.requestLimb(limb),
       });
     }
   }
 
   /** Ask the holder for a limb, by default for the last one whose claim failed. */
-  requestLimb(limb = this.#contestedLimb): void {
+  requestLimb(limb: number | null = this.#contestedLimb): void {
     if (this.viewOnly) return;
     const holder = limb === null ? null : this.limbStates()[limb]?.holder;
     if (limb === null || !holder || holder.mine) {

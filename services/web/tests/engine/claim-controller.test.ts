@@ -1,14 +1,12 @@
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
-import { ClaimController } from "../../src/app/claim-controller";
-import type { Playback } from "../../src/app/playback";
 import { Puppeteer } from "../../src/client/puppeteer";
 import { Viewer } from "../../src/client/viewer";
+import { type AskOffer, ClaimController } from "../../src/engine/claim-controller";
+import type { Playback } from "../../src/engine/playback";
 import type { LimbController } from "../../src/input/limb-controller";
 import { DEFAULT_MAPPING } from "../../src/input/mapping";
 import { VelocityInputs } from "../../src/input/velocity-input";
 import type { LimbState } from "../../src/ui/limb-state";
-import type { ToastAction } from "../../src/ui/notification/toast";
-import type { Page } from "../../src/ui/page";
 import { FakeWebSocket } from "../client/fake-websocket";
 import { goldenDescription } from "../golden-motion";
 import { createLimbController, type FakePuppeteer } from "../input/fake-puppeteer";
@@ -27,13 +25,12 @@ let viewer: Viewer;
 let puppeteer: Puppeteer;
 let stream: FakeWebSocket;
 let control: FakeWebSocket;
-let toasts: [string, ToastAction | undefined][];
+let toasts: [string, AskOffer | undefined][];
 let notices: string[];
 let shaken: number[];
 let shown: readonly LimbState[];
 let shownPerformer: number;
 let giveKey: string | null;
-let shownAvatars: number[];
 
 beforeEach(() => {
   FakeWebSocket.install();
@@ -44,21 +41,14 @@ beforeEach(() => {
   puppeteer = new Puppeteer({ url: "ws://stage/control", viewer, now: () => 0 });
   control = FakeWebSocket.last;
   control.accept();
-  const page = {
-    strings: {
-      render: (limbs: readonly LimbState[], _: boolean, selected: number) =>
-        ([shown, shownPerformer] = [limbs, selected]),
-      notice: (text: string) => notices.push(text),
+  controller = new ClaimController(
+    {
+      render: ({ limbs, performer, giveKey: key }) => ([shown, shownPerformer, giveKey] = [limbs, performer, key]),
+      toast: (message, offer) => toasts.push([message, offer]),
+      notice: (text) => notices.push(text),
     },
-    limbRequests: { render: (_: unknown, keyHint: string | null) => (giveKey = keyHint) },
-    library: {
-      danceAs: {
-        dancers: (limbs: readonly LimbState[], selected: number) => (shownAvatars = [limbs.length, selected]),
-      },
-    },
-    toast: (message: string, action?: ToastAction) => toasts.push([message, action]),
-  };
-  controller = new ClaimController(page as unknown as Page, () => DEFAULT_MAPPING);
+    () => DEFAULT_MAPPING,
+  );
   hands = createLimbController(createStandingPuppet(), puppeteer as unknown as FakePuppeteer);
   velocity = new VelocityInputs(hands, {
     claim: (limb) => controller.claim(limb, "velocity"),
@@ -89,10 +79,10 @@ describe("limb held by another user", () => {
   test("claiming it shakes the ring, names the holder and offers to ask", () => {
     expect(velocity.hold(LEFT_HAND)).toBe(false);
     expect([hands.source(LEFT_HAND), shaken, control.messagesOf("Claim")]).toEqual([null, [LEFT_HAND], []]);
-    expect(toasts.map(([message, action]) => [message, action?.label, action?.key])).toEqual([
+    expect(toasts.map(([message, offer]) => [message, offer?.label, offer?.key])).toEqual([
       ["Mateo holds the left hand", "Ask", "R"],
     ]);
-    toasts[0][1]?.run();
+    controller.requestLimb(toasts[0][1]?.limb);
     expect(control.messagesOf("Ask")).toEqual([{ name: "Ask", limb: LEFT_HAND, wanted: true }]);
     expect([shown[LEFT_HAND].requestedByMe, shown[RIGHT_HAND].requestedByMe]).toEqual([true, false]);
     velocity.hold(LEFT_HAND);
@@ -207,7 +197,7 @@ describe("several performers", () => {
     sendPresence([null, null, null, null, "m", null, null, null], Array(8).fill([]));
     expect([shown.length, shown[0].holder, shown[SECOND].holder?.name]).toEqual([8, null, "Mateo"]);
     controller.selectedPerformer.select(1);
-    expect([shownPerformer, shownAvatars]).toEqual([1, [8, 1]]);
+    expect(shownPerformer).toBe(1);
     velocity.hold(velocity.limb(LEFT_HAND));
     expect(toasts.at(-1)?.[0]).toBe("Mateo holds the left hand of dancer 2");
     expect(shaken).toEqual([SECOND + LEFT_HAND]);

@@ -1,6 +1,6 @@
 /** Playback of a session or of a single motion: its viewer, its puppeteer, and edits of its timeline. */
 import { type Access, pageAccess } from "../client/access";
-import { createSession, editSession, listSessions, type Session, type SessionEdit } from "../client/api";
+import { editSession, type SessionEdit } from "../client/api";
 import { Puppeteer } from "../client/puppeteer";
 import { Viewer } from "../client/viewer";
 
@@ -9,20 +9,6 @@ const SEEK_SETTLE_TIMEOUT_MS = 1200;
 
 /** Minimum time between two edits of a session: the server limits the changes of one subject. */
 const EDIT_INTERVAL_MS = 60;
-
-/**
- * Return the first running session. If there is none and `access` allows it, create one that plays the newest motion.
- * Returns null if there is no session and none can be created.
- */
-export async function findOrCreateSession(
-  newestMotion: Promise<string | null>,
-  access = pageAccess,
-): Promise<Session | null> {
-  const { items } = await listSessions(undefined, access);
-  if (items.length > 0) return items[0];
-  const motion = access.allows("control") ? await newestMotion : null;
-  return motion ? createSession(motion) : null;
-}
 
 /** Kind of playback: a session, whose timeline all viewers share, or a motion on a private timeline. */
 export type PlaybackKind = "sessions" | "motions";
@@ -33,6 +19,8 @@ export interface PlaybackOptions {
   access?: Access;
   /** Open no control connection: limbs cannot be claimed. */
   viewOnly?: boolean;
+  /** Return true while nobody sees the stage; by default while the page is in the background. */
+  isHidden?: () => boolean;
 }
 
 export class Playback {
@@ -51,14 +39,14 @@ export class Playback {
     private readonly onEditError: (error: unknown) => void,
     options: PlaybackOptions = {},
   ) {
-    const { kind = "sessions", access = pageAccess, viewOnly = false } = options;
+    const { kind = "sessions", access = pageAccess, viewOnly = false, isHidden } = options;
     [this.kind, this.access] = [kind, access];
     const base = `${(access.server || location.origin).replace(/^http/, "ws")}/v1/${kind}/${encodeURIComponent(id)}`;
     const control =
       kind === "sessions" && !viewOnly && access.allows("control")
         ? `${base}/control?name=${encodeURIComponent(name)}`
         : null;
-    this.viewer = new Viewer({ url: `${base}/stream`, access });
+    this.viewer = new Viewer({ url: `${base}/stream`, access, ...(isHidden ? { isHidden } : {}) });
     this.puppeteer = new Puppeteer({ url: control, viewer: this.viewer, access });
     this.viewer.attach(this.puppeteer);
   }

@@ -1,10 +1,14 @@
-/** Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. */
+/**
+ * Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. It runs in
+ * a worker or in the page.
+ */
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
 import { createPointerInput, type PointerInput } from "../input/pointer";
 import { VelocityInputs } from "../input/velocity-input";
 import type { Pose } from "../motion/skeleton";
+import type { StageCanvas } from "../stage/rendering/canvas";
 import type { Graphics } from "../stage/rendering/graphics";
 import { Stage } from "../stage/stage";
 import type { StringState } from "../stage/strings/strings";
@@ -46,7 +50,7 @@ export class StageController {
 
   /** Draw on `canvas`, and connect its inputs to `limbController`. Throws if the browser has no WebGL 2. */
   constructor(
-    canvas: HTMLCanvasElement,
+    canvas: StageCanvas,
     private readonly limbController: ClaimController,
     { getMapping, actions, onClaimsChange, graphics }: StageControllerOptions,
   ) {
@@ -60,7 +64,7 @@ export class StageController {
       isFree,
       selection,
     });
-    this.pointer = createPointerInput(canvas, this.stage, this.hands, {
+    this.pointer = createPointerInput(this.stage, this.hands, {
       canClaim: isFree,
       onRefused: (limb) => limbController.onClaimRefused(limb),
       onClaimed: (limb) => selection.select(performerOfLimb(limb)),

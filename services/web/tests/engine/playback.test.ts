@@ -1,6 +1,7 @@
 import { afterEach, expect, test, vi } from "vitest";
-import { findOrCreateSession, Playback } from "../../src/app/playback";
 import { Access } from "../../src/client/access";
+import { findOrCreateSession } from "../../src/client/api";
+import { Playback } from "../../src/engine/playback";
 import { FakeWebSocket } from "../client/fake-websocket";
 
 const requests: string[] = [];
@@ -16,23 +17,6 @@ function stubServer(responses: Record<string, unknown>): void {
 afterEach(() => {
   requests.length = 0;
   vi.unstubAllGlobals();
-});
-
-test("running session is found without waiting for the library", async () => {
-  stubServer({ "GET /v1/sessions": { items: [{ id: "on" }, { id: "later" }], next: null } });
-  expect(await findOrCreateSession(new Promise(() => undefined))).toEqual({ id: "on" });
-});
-
-test("session of the newest motion is created if none is running", async () => {
-  stubServer({ "GET /v1/sessions": { items: [], next: null }, "POST /v1/sessions": { id: "new" } });
-  expect(await findOrCreateSession(Promise.resolve("dance"))).toEqual({ id: "new" });
-  expect(requests).toEqual(["GET /v1/sessions", "POST /v1/sessions"]);
-});
-
-test("no session is created without a motion", async () => {
-  stubServer({ "GET /v1/sessions": { items: [], next: null } });
-  expect(await findOrCreateSession(Promise.resolve(null))).toBeNull();
-  expect(requests).toEqual(["GET /v1/sessions"]);
 });
 
 test("session of another server is found, opened and edited there", async () => {

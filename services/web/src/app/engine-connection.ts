@@ -1,0 +1,118 @@
+/**
+ * Connection of the page to its engine. The engine runs in a worker if the browser can draw there, otherwise in the
+ * page; both receive and send the same messages.
+ */
+import type {
+  EngineCommand,
+  EngineEvent,
+  EngineFailure,
+  EngineOptions,
+  EngineRequest,
+  EngineResults,
+} from "../engine/message";
+import type { EngineHello, EngineStart } from "../engine/worker";
+
+/** Where the engine may run: in a worker if possible, or always in the page. */
+export type EngineRealm = "worker" | "page";
+
+/** Failure of a request to the engine. */
+export class EngineError extends Error {
+  override readonly name = "EngineError";
+
+  constructor(readonly failure: EngineFailure) {
+    super(failure.message);
+  }
+}
+
+interface PendingRequest {
+  resolve(result: never): void;
+  reject(error: EngineError): void;
+}
+
+export class EngineConnection {
+  /** Messages of the time before the engine runs; null afterwards. */
+  #queue: EngineCommand[] | null = [];
+  #send: (command: EngineCommand) => void = () => undefined;
+  readonly #pending = new Map<number, PendingRequest>();
+  #lastRequest = 0;
+
+  /** `onEvent` receives all events but the responses to requests. */
+  constructor(
+    private readonly canvas: HTMLCanvasElement,
+    private readonly options: EngineOptions,
+    private readonly onEvent: (event: EngineEvent) => void,
+  ) {}
+
+  /** Start the engine. What was sent before is delivered then. */
+  async start(realm: EngineRealm): Promise<void> {
+    const worker = realm === "worker" ? await this.#startWorker() : null;
+    if (worker) this.#send = (command) => worker.postMessage(command);
+    else if (!(await this.#startInPage())) {
+      this.onEvent({ type: "unavailable", reason: "not loaded" });
+      return;
+    }
+    const queue = this.#queue ?? [];
+    this.#queue = null;
+    for (const command of queue) this.#send(command);
+  }
+
+  post(command: EngineCommand): void {
+    if (this.#queue) this.#queue.push(command);
+    else this.#send(command);
+  }
+
+  /** Send a request. Rejects with EngineError. */
+  request<Request extends EngineRequest>(request: Request): Promise<EngineResults[Request["kind"]]> {
+    const id = ++this.#lastRequest;
+    return new Promise((resolve, reject) => {
+      this.#pending.set(id, { resolve, reject });
+      this.post({ type: "request", id, request });
+    });
+  }
+
+  /** Start the worker and give it the canvas. Return null, with the canvas untouched, if it cannot draw. */
+  async #startWorker(): Promise<Worker | null> {
+    if (typeof Worker === "undefined" || !("transferControlToOffscreen" in this.canvas)) return null;
+    const worker = new Worker(new URL("../engine/worker.ts", import.meta.url), { type: "module", name: "engine" });
+    const isSupported = await new Promise<boolean>((resolve) => {
+      worker.onmessage = ({ data }: MessageEvent<EngineHello>) => resolve(data.isSupported);
+      worker.onerror = (event) => {
+        event.preventDefault();
+        resolve(false);
+      };
+    });
+    if (!isSupported) {
+      worker.terminate();
+      return null;
+    }
+    worker.onerror = null;
+    worker.onmessage = ({ data }: MessageEvent<EngineEvent>) => this.#onEvent(data);
+    const canvas = this.canvas.transferControlToOffscreen();
+    worker.postMessage({ type: "start", canvas, options: this.options } satisfies EngineStart, [canvas]);
+    return worker;
+  }
+
+  /** Start the engine in the page. Messages are copied and delivered later, as with a worker. */
+  async #startInPage(): Promise<boolean> {
+    const module = await import("../engine/engine").catch(() => null);
+    if (!module) return false;
+    const { port1, port2 } = new MessageChannel();
+    const engine = new module.Engine(this.canvas, this.options, (event) => port2.postMessage(event));
+    port1.onmessage = ({ data }: MessageEvent<EngineEvent>) => this.#onEvent(data);
+    port2.onmessage = ({ data }: MessageEvent<EngineCommand>) => engine.handle(data);
+    this.#send = (command) => port1.postMessage(command);
+    void engine.start();
+    return true;
+  }
+
+  #onEvent(event: EngineEvent): void {
+    if (event.type !== "response") {
+      this.onEvent(event);
+      return;
+    }
+    const pending = this.#pending.get(event.id);
+    this.#pending.delete(event.id);
+    if (event.failure) pending?.reject(new EngineError(event.failure));
+    else pending?.resolve(event.result as never);
+  }
+}

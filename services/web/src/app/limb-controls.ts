@@ -1,0 +1,45 @@
+/** Controls of limbs on the page: keys, gamepad, buttons and panels act on limbs that are in the engine. */
+import type { EngineCommand, LimbAction, StageState } from "../engine/message";
+import type { PageActions } from "../input/command-dispatcher";
+import { RemoteCommands } from "../input/remote-commands";
+
+export class LimbControls {
+  readonly commands: RemoteCommands;
+  /** Performer whose limbs keys, gamepad and page controls act on. */
+  performer = 0;
+  #isLimbSelected = false;
+  #holdsLimb = false;
+
+  constructor(
+    private readonly send: (command: EngineCommand) => void,
+    actions: PageActions,
+  ) {
+    this.commands = new RemoteCommands(actions, () => this.#isLimbSelected, send);
+  }
+
+  /** Act on a limb, by default on the one that the action refers to. */
+  act(action: LimbAction, limb: number | null = null): void {
+    this.send({ type: "limb", action, limb });
+  }
+
+  /** Set the limb whose control has the focus. */
+  focus(limb: number | null): void {
+    this.send({ type: "set", settings: { focusedLimb: limb } });
+  }
+
+  selectPerformer(performer: number | "next"): void {
+    this.send({ type: "performer", performer });
+  }
+
+  /** Release all limbs held by keys, gamepad or buttons. Return whether any limb was held. */
+  releaseAll(): boolean {
+    if (this.#holdsLimb) this.send({ type: "release limbs" });
+    return this.#holdsLimb;
+  }
+
+  /** Follow the state of the stage. */
+  update({ selectedLimb, holdsLimb }: Pick<StageState, "selectedLimb" | "holdsLimb">): void {
+    this.#isLimbSelected = selectedLimb !== null;
+    this.#holdsLimb = holdsLimb;
+  }
+}

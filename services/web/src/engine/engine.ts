@@ -1,0 +1,334 @@
+/**
+ * The engine of a page: connections, decoding, limbs and rendering. It runs in a worker, or in the page where workers
+ * cannot draw, and knows the page only by messages.
+ */
+import { AvatarError } from "../avatar/error";
+import { Access } from "../client/access";
+import { ProblemError } from "../client/problem";
+import type { PageActions } from "../input/command-dispatcher";
+import { ACTIONS, DEFAULT_MAPPING } from "../input/mapping";
+import type { StageCanvas } from "../stage/rendering/canvas";
+import { type Graphics, openGraphics } from "../stage/rendering/graphics";
+import { AvatarModels } from "./avatar-models";
+import { ClaimController } from "./claim-controller";
+import type {
+  EngineCommand,
+  EngineEvent,
+  EngineFailure,
+  EngineOptions,
+  EngineRequest,
+  EngineResults,
+  EngineSettings,
+  LimbAction,
+  PlaybackRequest,
+  ViewerTime,
+} from "./message";
+import { Playback } from "./playback";
+import { publishPlayback } from "./playback-publisher";
+import type { StageController } from "./stage-controller";
+
+const STATISTICS_INTERVAL_MS = 500;
+
+/** The page runs these actions itself when their controls are pressed. */
+const NO_ACTIONS = Object.fromEntries(ACTIONS.map((action) => [action, () => undefined])) as unknown as PageActions;
+
+/** Settings until the page sends its own. */
+const INITIAL_SETTINGS: EngineSettings = {
+  theme: "night",
+  reducedMotion: false,
+  mapping: DEFAULT_MAPPING,
+  focusedLimb: null,
+  isHidden: false,
+  viewport: { width: 1, height: 1, framing: "desktop", pixelRatio: 1, sideInsets: [0, 0], bottomInset: 0 },
+};
+
+export class Engine {
+  readonly #settings = { ...INITIAL_SETTINGS };
+  readonly #access: Access;
+  readonly #claims: ClaimController;
+  readonly #avatars = new AvatarModels();
+  /** Add this to a time of the page's clock for the time of this realm's. */
+  readonly #clockShiftMs: number;
+  #controller: StageController | null = null;
+  #describeStage: typeof import("./stage-state").describeStage | null = null;
+  #playback: Playback | null = null;
+  #playbackNumber = 0;
+  #lastState = "";
+  #lastPosition = NaN;
+
+  /** Call `start` once afterwards. Events are sent by `send`. */
+  constructor(
+    private readonly canvas: StageCanvas,
+    private readonly options: EngineOptions,
+    private readonly send: (event: EngineEvent) => void,
+  ) {
+    this.#clockShiftMs = options.timeOrigin - performance.timeOrigin;
+    this.#access = new Access(options.server, options.token);
+    this.#access.onUnauthorized(({ title, detail, hint }) => send({ type: "unauthorized", title, detail, hint }));
+    this.#claims = new ClaimController(
+      {
+        render: (state) => send({ type: "limbs", state }),
+        toast: (message, ask = undefined) => send({ type: "toast", message, ask: ask ?? null }),
+        notice: (text) => send({ type: "limb notice", text }),
+      },
+      () => this.#settings.mapping,
+    );
+    this.#claims.viewOnly = !this.#access.allows("control");
+    setInterval(() => this.#sendStatistics(), STATISTICS_INTERVAL_MS);
+  }
+
+  /** Load the renderer and start drawing. Reports a stage that cannot be drawn. */
+  async start(): Promise<void> {
+    let graphics: Graphics;
+    try {
+      graphics = openGraphics(this.canvas, this.options.bestQuality);
+    } catch {
+      this.send({ type: "unavailable", reason: "graphics" });
+      return;
+    }
+    const chunk = await import("./stage-chunk").catch(() => null);
+    if (!chunk) {
+      this.send({ type: "unavailable", reason: "not loaded" });
+      return;
+    }
+    // Handle messages that arrived meanwhile first: the requests they lead to are sent before the stage is built.
+    await new Promise((resolve) => setTimeout(resolve));
+    this.#describeStage = chunk.describeStage;
+    this.#build(
+      new chunk.StageController(this.canvas, this.#claims, {
+        getMapping: () => this.#settings.mapping,
+        actions: NO_ACTIONS,
+        onClaimsChange: () => this.#onClaimsChange(),
+        graphics,
+      }),
+    );
+    this.send({ type: "ready" });
+    requestAnimationFrame(() => this.#drawFrame());
+  }
+
+  /** Handle a message of the page. */
+  handle(command: EngineCommand): void {
+    const { commands, pointer, stage, velocity } = this.#controller ?? {};
+    switch (command.type) {
+      case "set":
+        Object.assign(this.#settings, command.settings);
+        this.#applySettings(command.settings);
+        break;
+      case "open":
+        this.#open(command.playback);
+        break;
+      case "edit":
+        this.#playback?.edit(command.change);
+        break;
+      case "seek":
+        this.#playback?.seek(command.seconds, this.#toLocal(command.now));
+        break;
+      case "seek by blocks":
+        this.#playback?.seekByBlocks(command.blocks, this.#toLocal(command.now));
+        break;
+      case "pointer":
+        pointer?.handle({ ...command.event, now: this.#toLocal(command.event.now) });
+        break;
+      case "press":
+        commands?.press(command.control, command.commands, command.strength, this.#toLocal(command.now));
+        break;
+      case "release":
+        commands?.release(command.control, this.#toLocal(command.now));
+        break;
+      case "release all":
+        commands?.releaseAll((control) => command.controls.includes(control));
+        // A page in the background draws no frames, so nothing else would release the inputs that were pressed.
+        if (this.#settings.isHidden) velocity?.update(performance.now());
+        break;
+      case "release limbs":
+        velocity?.releaseAll();
+        break;
+      case "limb":
+        this.#onLimbAction(command.action, command.limb);
+        break;
+      case "performer":
+        if (command.performer === "next") this.#claims.selectNextPerformer();
+        else this.#claims.selectedPerformer.select(command.performer);
+        break;
+      case "toggle camera":
+        stage?.followMotionCamera(!stage.followsMotionCamera);
+        break;
+      case "avatar active":
+        this.#avatars.setActive(command.performer, command.active);
+        break;
+      case "remove avatar":
+        this.#avatars.remove(command.performer);
+        break;
+      case "lead":
+        this.#setLead(command.lead);
+        break;
+      case "request":
+        void this.#respond(command.id, command.request);
+        break;
+    }
+  }
+
+  #build(controller: StageController): void {
+    const { canvas } = this;
+    this.#controller = controller;
+    canvas.addEventListener("webglcontextlost", () => this.send({ type: "graphics", isLost: true }));
+    canvas.addEventListener("webglcontextrestored", () => this.send({ type: "graphics", isLost: false }));
+    this.#avatars.stage = controller.stage;
+    this.#applySettings(this.#settings);
+    controller.setPlayback(this.#playback);
+    this.#exposeDebugHandle();
+  }
+
+  #applySettings({ theme, reducedMotion, mapping, viewport }: Partial<EngineSettings>): void {
+    if (mapping) this.#claims.render();
+    const stage = this.#controller?.stage;
+    if (!stage) return;
+    if (theme) stage.setTheme(theme);
+    if (reducedMotion !== undefined) stage.reducedMotion = reducedMotion;
+    if (!viewport) return;
+    const { width, height, framing, pixelRatio, sideInsets, bottomInset } = viewport;
+    stage.resize(width, height, framing, pixelRatio, sideInsets, bottomInset);
+  }
+
+  /** Enter a session or motion, and leave the current one. */
+  #open({ number, id, kind, name }: PlaybackRequest): void {
+    this.#playback?.close();
+    const playback = new Playback(id, name, (error) => this.#onEditError(error), {
+      kind,
+      access: this.#access,
+      isHidden: () => this.#settings.isHidden,
+    });
+    [this.#playback, this.#playbackNumber] = [playback, number];
+    this.#controller?.stage.cameraRecorder.clear();
+    this.#claims.connected = false;
+    this.#claims.setPlayback(playback);
+    this.#controller?.setPlayback(playback);
+    const { viewer } = playback;
+    const setConnected = (connected: boolean) => {
+      this.#claims.connected = connected;
+      this.#claims.render();
+    };
+    viewer.addEventListener("open", () => setConnected(true));
+    viewer.addEventListener("closed", () => setConnected(false));
+    for (const event of ["figure", "tracks"])
+      viewer.addEventListener(event, () => this.#controller?.updatePerformers());
+    publishPlayback(playback, (change) => {
+      if (number === this.#playbackNumber) this.send({ type: "playback", playback: number, change });
+    });
+    this.#claims.render();
+    this.#exposeDebugHandle();
+  }
+
+  #onEditError(error: unknown): void {
+    const problem = error instanceof ProblemError ? { title: error.title, detail: error.detail } : null;
+    this.send({ type: "edit failed", message: String(error), problem });
+  }
+
+  #onClaimsChange(): void {
+    this.send({ type: "holding", isHoldingAny: this.#controller?.hands.isHoldingAny ?? false });
+    this.#claims.render();
+  }
+
+  #onLimbAction(action: LimbAction, limb: number | null): void {
+    if (action === "ask") this.#claims.requestLimb(limb ?? undefined);
+    else if (action === "give") this.#claims.handOver(limb ?? undefined);
+    else if (limb === null) return;
+    else if (action === "toggle") this.#claims.toggleClaim(limb);
+    else if (action === "withdraw") this.#claims.withdrawRequest(limb);
+    else this.#controller?.velocity.hold(limb);
+  }
+
+  #setLead(lead: Extract<EngineCommand, { type: "lead" }>["lead"]): void {
+    const viewer = this.#playback?.viewer;
+    if (!viewer) return;
+    const at = lead && this.#toLocal(lead.at);
+    viewer.leader = lead && at !== null ? (now) => ({ time: lead.time + (now - at) * 1000, run: lead.run }) : null;
+  }
+
+  #drawFrame(): void {
+    requestAnimationFrame(() => this.#drawFrame());
+    const controller = this.#controller;
+    if (!controller || !this.#describeStage) return;
+    const now = performance.now();
+    const state = this.#describeStage(controller, controller.draw(now, this.#settings.focusedLimb));
+    const time = this.#viewerTime(now);
+    const described = JSON.stringify(state);
+    if (described !== this.#lastState || (time?.position ?? NaN) !== this.#lastPosition)
+      this.send({
+        type: "frame",
+        state: described === this.#lastState ? null : state,
+        playback: this.#playbackNumber,
+        time,
+      });
+    this.#lastState = described;
+    this.#lastPosition = time?.position ?? NaN;
+    this.#playback?.viewer.recordFrame(performance.now() - now);
+  }
+
+  /** Return the viewer's time at local `now`; null before the server has sent its own. */
+  #viewerTime(now: number): ViewerTime | null {
+    const playback = this.#playback;
+    if (!playback?.viewer.clock.hasEstimate) return null;
+    return {
+      now: now - this.#clockShiftMs,
+      position: playback.position(now),
+      ownTime: playback.viewer.ownTime(now),
+      isClockSettled: playback.viewer.clock.isSettled,
+    };
+  }
+
+  #sendStatistics(): void {
+    const playback = this.#playback;
+    if (!playback) return;
+    this.send({
+      type: "statistics",
+      playback: this.#playbackNumber,
+      statistics: playback.viewer.statistics(),
+      isConnected: this.#claims.connected,
+      time: this.#viewerTime(performance.now()),
+    });
+  }
+
+  async #respond(id: number, request: EngineRequest): Promise<void> {
+    try {
+      this.send({ type: "response", id, result: await this.#fulfil(request) });
+    } catch (error) {
+      this.send({ type: "response", id, failure: describeFailure(error) });
+    }
+  }
+
+  async #fulfil(request: EngineRequest): Promise<EngineResults[EngineRequest["kind"]]> {
+    const stage = this.#controller?.stage;
+    switch (request.kind) {
+      case "picture":
+        if (!stage) throw new Error("There is no stage to draw a picture of.");
+        return stage.takePicture();
+      case "load avatar":
+        return this.#avatars.load(request.performer, request.file);
+      case "camera keyframes": {
+        const viewer = this.#playback?.viewer;
+        const clock = viewer?.clockTime(performance.now()) ?? null;
+        return viewer && clock !== null
+          ? (stage?.cameraRecorder.movedKeyframes(clock - viewer.duration * 1e6) ?? [])
+          : [];
+      }
+    }
+  }
+
+  #toLocal(pageMs: number): number {
+    return pageMs + this.#clockShiftMs;
+  }
+
+  /** Set `bunraku` in this realm, the parts of the engine, for tests and for developers. */
+  #exposeDebugHandle(): void {
+    const { stage = null, hands = null } = this.#controller ?? {};
+    const { viewer = null, puppeteer = null } = this.#playback ?? {};
+    const global = globalThis as { bunraku?: object };
+    global.bunraku = { ...global.bunraku, stage, hands, viewer, puppeteer };
+  }
+}
+
+function describeFailure(error: unknown): EngineFailure {
+  const known = error instanceof AvatarError ? { title: error.title, detail: error.detail, hint: error.hint } : null;
+  return { known, message: String(error) };
+}

@@ -1,0 +1,191 @@
+/**
+ * Messages between the page and its engine, which runs in a worker or, where that is not possible, in the page. Times
+ * are milliseconds on the page's clock, `performance.now()`; positions and boxes are CSS pixels of the canvas.
+ */
+import type { CameraKeyframe, SessionEdit } from "../client/api";
+import type { ViewerStatistics } from "../client/viewer";
+import type { Language } from "../i18n/translator";
+import type { Mapping } from "../input/mapping";
+import type { PointerMessage } from "../input/pointer";
+import type { CommandMessage } from "../input/remote-commands";
+import type { LeaderTime } from "../playout/presentation-clock";
+import type { Framing } from "../stage/camera/audience-camera";
+import type { ScreenBox } from "../stage/camera/screen-box";
+import type { ScreenPosition } from "../stage/camera/screen-projection";
+import type { Theme } from "../stage/scenery/look";
+import type { LimbState } from "../ui/limb-state";
+import type { Presence, TimelineState } from "../wire/messages";
+import type { AskOffer, ClaimState } from "./claim-controller";
+import type { PlaybackKind } from "./playback";
+
+/** Values that an engine is started with. */
+export interface EngineOptions {
+  /** Origin of the server, and the token for it, if any. */
+  readonly server: string;
+  readonly token: string | null;
+  readonly language: Language;
+  /** `performance.timeOrigin` of the page. */
+  readonly timeOrigin: number;
+  /** Draw in the best quality, whatever it costs. */
+  readonly bestQuality: boolean;
+}
+
+/** State of the page that the engine follows. */
+export interface EngineSettings {
+  theme: Theme;
+  reducedMotion: boolean;
+  mapping: Mapping;
+  /** Limb whose control has the focus. */
+  focusedLimb: number | null;
+  /** True while the page is in the background. */
+  isHidden: boolean;
+  viewport: Viewport;
+}
+
+/** Size of the canvas, and the parts of it that panels cover. */
+export interface Viewport {
+  readonly width: number;
+  readonly height: number;
+  readonly framing: Framing;
+  readonly pixelRatio: number;
+  readonly sideInsets: readonly [number, number];
+  readonly bottomInset: number;
+}
+
+/** Session or motion to enter. Events of a playback carry its number. */
+export interface PlaybackRequest {
+  readonly number: number;
+  readonly id: string;
+  readonly kind: PlaybackKind;
+  /** Name of this page's user. */
+  readonly name: string;
+}
+
+/** Actions on a limb by its controls on the page. Null means the limb that the action refers to by default. */
+export type LimbAction = "toggle" | "hold" | "ask" | "withdraw" | "give";
+
+export type EngineCommand =
+  | { type: "set"; settings: Partial<EngineSettings> }
+  | { type: "open"; playback: PlaybackRequest }
+  | { type: "edit"; change: SessionEdit }
+  | { type: "seek"; seconds: number; now: number }
+  | { type: "seek by blocks"; blocks: number; now: number }
+  | { type: "pointer"; event: PointerMessage }
+  | CommandMessage
+  /** Release all limbs held by keys, gamepad or buttons. */
+  | { type: "release limbs" }
+  | { type: "limb"; action: LimbAction; limb: number | null }
+  | { type: "performer"; performer: number | "next" }
+  | { type: "toggle camera" }
+  | { type: "avatar active"; performer: number; active: boolean }
+  | { type: "remove avatar"; performer: number }
+  /** Stage time that the sound presents at the time `at`; null without sound. */
+  | { type: "lead"; lead: (LeaderTime & { readonly at: number }) | null }
+  | { type: "request"; id: number; request: EngineRequest };
+
+/** Requests, each answered by one response. */
+export type EngineRequest =
+  | { kind: "picture" }
+  | { kind: "load avatar"; performer: number; file: File }
+  | { kind: "camera keyframes" };
+
+/** Results of the requests, by their kind. */
+export interface EngineResults {
+  picture: Blob;
+  /** Name of the avatar; null if another request for the same performer replaced this one. */
+  "load avatar": string | null;
+  /** Camera's movement during the last loop of the motion; empty if the camera was not moved. */
+  "camera keyframes": CameraKeyframe[];
+}
+
+/** Failure of a request. */
+export interface EngineFailure {
+  /** Texts for the user, if the cause is known to them. */
+  readonly known: { readonly title: string; readonly detail: string; readonly hint: string | null } | null;
+  readonly message: string;
+}
+
+/** State of the stage after a frame. */
+export interface StageState {
+  /** True if the first performer has a pose. */
+  readonly hasPose: boolean;
+  /** True if a frame with a performer is on the screen. */
+  readonly hasDrawnPerformer: boolean;
+  readonly limbs: readonly LimbState[];
+  /** Control bars by limb number, null for those that are not on the stage. */
+  readonly bars: readonly (ScreenBox | null)[];
+  readonly faces: readonly ScreenBox[];
+  /** The hand nearer to the audience, for the invitation. */
+  readonly nearerHand: ScreenPosition | null;
+  readonly hasMotionCamera: boolean;
+  readonly followsMotionCamera: boolean;
+  /** True if the pointer is over a handle, or drags one. */
+  readonly isPointerNear: boolean;
+  readonly isPulling: boolean;
+  /** Limb that inputs for "the held limb" move. */
+  readonly selectedLimb: number | null;
+  /** True if any limb is held by keys, gamepad or buttons, or pulled by a pointer. */
+  readonly holdsLimb: boolean;
+}
+
+/** Time of a viewer: what a position and the sound are computed from between two messages. */
+export interface ViewerTime {
+  readonly now: number;
+  /** Position in the motion in seconds. */
+  readonly position: number;
+  /** Reference time without a leader, in microseconds. */
+  readonly ownTime: number;
+  readonly isClockSettled: boolean;
+}
+
+/** Constants of an audio track (`AudioTrack`). */
+export interface AudioTrackConstants {
+  readonly motion: readonly [fps: number, frames: number, blockFrames: number, firstFrames: number];
+  readonly channels: number;
+  readonly preSkip: number;
+  readonly samples: number;
+  readonly kbps: readonly number[];
+}
+
+/** Change of a playback: the name of the viewer's event, and the values that have changed with it. */
+export type PlaybackChange =
+  | {
+      event: "figure" | "tracks";
+      motion: string | null;
+      performerCount: number;
+      /** Seconds. */
+      duration: number;
+      levelCount: number;
+      /** Absent if the audio track is still the same. */
+      audio?: AudioTrackConstants | null;
+    }
+  | { event: "timeline"; timeline: TimelineState | null }
+  | { event: "presence"; presence: Presence | null }
+  | { event: "blocks"; blocks: Int8Array }
+  | { event: "open" }
+  | { event: "closed"; reason: string; isClosed: boolean }
+  | { event: "welcome"; puppeteer: string | null }
+  | { event: "audio packets"; packets: readonly { readonly number: number; readonly data: Uint8Array }[] };
+
+export type EngineEvent =
+  | { type: "ready" }
+  /** There will be no stage. */
+  | { type: "unavailable"; reason: "graphics" | "not loaded" }
+  /** A frame: the stage, null if it has not changed, and the time of the playback, null before it is known. */
+  | { type: "frame"; state: StageState | null; playback: number; time: ViewerTime | null }
+  | { type: "graphics"; isLost: boolean }
+  | { type: "playback"; playback: number; change: PlaybackChange }
+  | {
+      type: "statistics";
+      playback: number;
+      statistics: ViewerStatistics;
+      isConnected: boolean;
+      time: ViewerTime | null;
+    }
+  | { type: "edit failed"; message: string; problem: { title: string; detail: string } | null }
+  | { type: "unauthorized"; title: string; detail: string; hint: string | null }
+  | { type: "limbs"; state: ClaimState }
+  | { type: "holding"; isHoldingAny: boolean }
+  | { type: "toast"; message: string; ask: AskOffer | null }
+  | { type: "limb notice"; text: string }
+  | { type: "response"; id: number; result?: unknown; failure?: EngineFailure };
