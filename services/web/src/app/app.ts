@@ -92,6 +92,7 @@ export class App implements AppParts {
       avatarSlots: this.avatarSlots,
       send,
     });
+    this.#exposeDebugHandle();
     this.theme = createTheme((theme) => {
       page.header.setTheme(theme);
       this.stageHost.setTheme(theme);
@@ -113,5 +114,11 @@ export class App implements AppParts {
     saveMapping(mapping);
     this.page.mappingDialog.setMapping(mapping);
     this.stageHost.setMapping(mapping);
+  }
+
+  /** Add the sound to `window.bunraku`, where tests and developers find the parts of the page. */
+  #exposeDebugHandle(): void {
+    const global = globalThis as { bunraku?: object };
+    global.bunraku = { ...global.bunraku, listening: this.soundController };
   }
 }

@@ -9,12 +9,10 @@ import { DamagedBlock } from "./errors";
 import { magnitudeLevel } from "./magnitude-level";
 import { HAZARD_ROWS, HAZARD_TABLE_OF, type Prior, SIGN_CONTEXTS, UNARY_DECISIONS } from "./prior";
 import { HALF_PROBABILITY, RangeDecoder } from "./range-coder";
+import { MAX_BLOCK_FRAMES } from "./timing";
 
 /** Limit of the bytes of a block. */
 export const MAX_BLOCK_BYTES = 65_536;
-
-/** Limit of the frames of a block. */
-export const MAX_BLOCK_FRAMES = 512;
 
 const NOMINAL_FRAMES_PROBABILITY = 32440;
 const ROOT_ONLY_PROBABILITY = 512;

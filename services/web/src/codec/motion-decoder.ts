@@ -2,9 +2,10 @@
 
 import { fromRotationVector, multiply } from "../motion/rotation";
 import { CHANNEL_COUNT, JOINT_COUNT, type Pose } from "../motion/skeleton";
-import { decodeCoefficients, MAX_BLOCK_FRAMES } from "./coefficients";
+import { decodeCoefficients } from "./coefficients";
 import type { MotionTrack } from "./motion-track";
 import { loadShippedPrior, type Prior } from "./prior";
+import { MAX_BLOCK_FRAMES } from "./timing";
 import { cosineBasis } from "./transform";
 
 /** Quantiser step of index 0 for a block of 30 frames, metres. It doubles every 16 indices. */

@@ -5,11 +5,11 @@
  * vertical field of view 6 in radians; of a light its colour 3-5 in linear RGB and its intensity 6.
  */
 
-import { decodeCoefficients, MAX_BLOCK_FRAMES, SCENE_CHANNEL_COUNT } from "./coefficients";
+import { decodeCoefficients, SCENE_CHANNEL_COUNT } from "./coefficients";
 import { DamagedBlock } from "./errors";
 import { reconstruct, stepSize } from "./motion-decoder";
 import { loadShippedPrior, type Prior } from "./prior";
-import { type BitrateLevel, parseLadder, parseTiming, Timing, type TrackDescription } from "./timing";
+import { type BitrateLevel, MAX_BLOCK_FRAMES, parseLadder, parseTiming, Timing, type TrackDescription } from "./timing";
 import { cosineBasis } from "./transform";
 
 export const SCENE_CODEC = "bunraku.scene/1";

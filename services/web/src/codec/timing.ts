@@ -1,7 +1,9 @@
 /** Division of a track into blocks over time, the same for motion, scene and audio (`proto/messages.md`, 3.2). */
 
-import { MAX_BLOCK_FRAMES } from "./coefficients";
 import { DamagedBlock } from "./errors";
+
+/** Limit of the frames of a block. */
+export const MAX_BLOCK_FRAMES = 512;
 
 // instants are integer microseconds, and a duration is less than 2^48 of them
 const MAX_FPS = 100_000;

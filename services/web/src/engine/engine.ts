@@ -53,6 +53,8 @@ export class Engine {
   #describeStage: typeof import("./stage-state").describeStage | null = null;
   #playback: Playback | null = null;
   #playbackNumber = 0;
+  readonly #statisticsTimer: ReturnType<typeof setInterval>;
+  #isClosed = false;
   #lastState = "";
   #lastPosition = NaN;
 
@@ -74,7 +76,7 @@ export class Engine {
       () => this.#settings.mapping,
     );
     this.#claims.viewOnly = !this.#access.allows("control");
-    setInterval(() => this.#sendStatistics(), STATISTICS_INTERVAL_MS);
+    this.#statisticsTimer = setInterval(() => this.#sendStatistics(), STATISTICS_INTERVAL_MS);
   }
 
   /** Load the renderer and start drawing. Reports a stage that cannot be drawn. */
@@ -93,6 +95,7 @@ export class Engine {
     }
     // Handle messages that arrived meanwhile first: the requests they lead to are sent before the stage is built.
     await new Promise((resolve) => setTimeout(resolve));
+    if (this.#isClosed) return;
     this.#describeStage = chunk.describeStage;
     this.#build(
       new chunk.StageController(this.canvas, this.#claims, {
@@ -104,6 +107,15 @@ export class Engine {
     );
     this.send({ type: "ready" });
     requestAnimationFrame(() => this.#drawFrame());
+  }
+
+  /** Close the connections, stop drawing and free the graphics. */
+  close(): void {
+    this.#isClosed = true;
+    clearInterval(this.#statisticsTimer);
+    this.#playback?.close();
+    this.#controller?.stage.dispose();
+    this.#playback = this.#controller = null;
   }
 
   /** Handle a message of the page. */
@@ -246,6 +258,7 @@ export class Engine {
   }
 
   #drawFrame(): void {
+    if (this.#isClosed) return;
     requestAnimationFrame(() => this.#drawFrame());
     const controller = this.#controller;
     if (!controller || !this.#describeStage) return;

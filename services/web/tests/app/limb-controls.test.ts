@@ -1,0 +1,30 @@
+import { expect, test } from "vitest";
+import { LimbControls } from "../../src/app/limb-controls";
+import type { EngineCommand } from "../../src/engine/message";
+import { recordPageActions } from "../input/page-actions";
+
+test("Escape releases limbs only while one is held", () => {
+  const sent: EngineCommand[] = [];
+  const limbs = new LimbControls((command) => sent.push(command), recordPageActions([]));
+  expect([limbs.releaseAll(), sent]).toEqual([false, []]);
+  limbs.update({ selectedLimb: null, holdsLimb: true });
+  expect([limbs.releaseAll(), sent]).toEqual([true, [{ type: "release limbs" }]]);
+});
+
+test("keys for the held limb apply once a limb is selected", () => {
+  const sent: EngineCommand[] = [];
+  const limbs = new LimbControls((command) => sent.push(command), recordPageActions([]));
+  expect(limbs.commands.press("KeyW", ["held_y+"], 1, 0)).toBe(false);
+  limbs.update({ selectedLimb: 2, holdsLimb: true });
+  expect(limbs.commands.press("KeyW", ["held_y+"], 1, 0)).toBe(true);
+  limbs.act("give");
+  limbs.act("hold", 3);
+  limbs.focus(1);
+  limbs.selectPerformer("next");
+  expect(sent.slice(1)).toEqual([
+    { type: "limb", action: "give", limb: null },
+    { type: "limb", action: "hold", limb: 3 },
+    { type: "set", settings: { focusedLimb: 1 } },
+    { type: "performer", performer: "next" },
+  ]);
+});
