@@ -21,7 +21,7 @@ interface Clicks {
 }
 
 interface Conditions {
-  /** Maximum delay of each message, in milliseconds. The order is kept. */
+  /** Maximum delay of each part of a message, in milliseconds. The order is kept. */
   jitterMs?: number;
   /** False removes the browser's Opus decoder. */
   hasDecoder?: boolean;
@@ -60,12 +60,12 @@ describeInBrowser("sound", { server: "open", browser: FLAGS, fullFrameRate: true
     { jitterMs = 0, hasDecoder = true, bypassPolicy = false }: Conditions = {},
   ): Promise<Page> {
     const session = await fixture.request<{ id: string }>("POST", "/v1/sessions", { motion: id });
-    const page = await fixture.open(`/?session=${session.id}`, {
+    const server = jitterMs > 0 ? (await fixture.proxy(jitterMs)).url : fixture.url;
+    const page = await fixture.open(`${server}/?session=${session.id}`, {
       viewport: { width: 420, height: 320 },
       colorScheme: "dark",
       bypassCSP: bypassPolicy,
       before: async (page) => {
-        if (jitterMs > 0) await delayMessages(page, jitterMs);
         if (!hasDecoder) await page.addInitScript(() => void Reflect.deleteProperty(window, "AudioDecoder"));
       },
     });
@@ -221,20 +221,4 @@ async function recordClicks(): Promise<void> {
     };
     report();
   };
-}
-
-/** Delay each WebSocket message by 0 to `maxDelayMs` milliseconds, in order. */
-async function delayMessages(page: Page, maxDelayMs: number): Promise<void> {
-  await page.routeWebSocket(/\/v1\//, (client) => {
-    const server = client.connectToServer();
-    const delayed = (send: (message: string | Buffer) => void) => {
-      let due = 0;
-      return (message: string | Buffer) => {
-        due = Math.max(due, performance.now() + Math.random() * maxDelayMs);
-        setTimeout(() => send(message), due - performance.now());
-      };
-    };
-    client.onMessage(delayed((message) => server.send(message)));
-    server.onMessage(delayed((message) => client.send(message)));
-  });
 }

@@ -3,6 +3,7 @@ import { randomUUID } from "node:crypto";
 import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, describe, inject, onTestFinished } from "vitest";
 import { chromiumPath, connectToChromium } from "./chromium";
+import { type ConnectionProxy, startProxy } from "./connection-proxy";
 import type { ServerKind, SharedServer } from "./shared-resources";
 import { SLOW_FRAME_INTERVAL_MS, slowDownDisplay } from "./slow-display";
 
@@ -25,6 +26,8 @@ export interface BrowserFixture extends SharedServer {
   open(address?: string, options?: OpenOptions): Promise<Page>;
   /** Send a file or JSON to the server, as admin if it has access control. Return the body of the response. */
   request<T>(method: string, path: string, body?: RequestBody): Promise<T>;
+  /** Start a proxy of the server, which stops when the test ends. It delays WebSockets by up to `maxDelayMs`. */
+  proxy(maxDelayMs?: number): Promise<ConnectionProxy>;
   /** Publish a page on the foreign site and return its path. */
   publish(html: string): Promise<string>;
 }
@@ -110,6 +113,11 @@ export function describeInBrowser(
         return session;
       },
       request,
+      async proxy(maxDelayMs) {
+        const proxy = await startProxy(server.url, maxDelayMs);
+        onTestFinished(() => proxy.stop());
+        return proxy;
+      },
       async publish(html) {
         const path = `/${randomUUID()}`;
         await fetch(server.site.origin + path, { method: "PUT", body: html });

@@ -1,5 +1,5 @@
 /** Control of limbs: key bindings, arrow buttons, gamepads, hand-over between puppeteers, and recording. */
-import type { Page, WebSocketRoute } from "playwright-core";
+import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import {
@@ -23,14 +23,9 @@ import {
 const REDUCED_MOTION: OpenOptions = { viewport: { width: 760, height: 560 }, reducedMotion: "reduce" };
 
 describeInBrowser("limb control", { server: "open" }, (fixture) => {
-  /** Open a page of a puppeteer with this name. Its stream connections are added to `sockets`. */
-  async function open(name: string, sockets: WebSocketRoute[] = []): Promise<Page> {
-    const before = (page: Page) =>
-      page.routeWebSocket(/\/stream/, (socket) => {
-        socket.connectToServer();
-        sockets.push(socket);
-      });
-    const page = await fixture.open(`?name=${name}`, { ...REDUCED_MOTION, before });
+  /** Open a page of a puppeteer with this name. */
+  async function open(name: string, server = fixture.url): Promise<Page> {
+    const page = await fixture.open(`${server}/?session=${fixture.session}&name=${name}`, REDUCED_MOTION);
     await waitUntilReady(page);
     return page;
   }
@@ -81,8 +76,8 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
   });
 
   test("a held limb's arrow buttons work by key, pointer and across a reconnect", async () => {
-    const sockets: WebSocketRoute[] = [];
-    const page = await open("Aiko", sockets);
+    const proxy = await fixture.proxy();
+    const page = await open("Aiko", proxy.url);
     await pauseAtStart(page);
     await page.keyboard.press("KeyS");
     await page.getByRole("button", { name: "Take left hand" }).click();
@@ -104,11 +99,9 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     await down.hover();
     await page.mouse.down();
     await page.waitForFunction(leftWristMoved, { from: raised, minimum: 0.05 });
-    const before = sockets.length;
-    await waitForToast(page, "Connection lost, reconnecting", async () =>
-      sockets.at(-1)?.close({ code: 1012, reason: "cut by the test" }),
-    );
-    await expect.poll(() => sockets.length).toBeGreaterThan(before);
+    const before = proxy.webSocketCount;
+    await waitForToast(page, "Connection lost, reconnecting", async () => proxy.cutWebSockets(/\/stream/));
+    await expect.poll(() => proxy.webSocketCount).toBeGreaterThan(before);
     await expect.poll(() => page.getByRole("button", { name: "Release left hand" }).isEnabled()).toBe(true);
     expect(await down.getAttribute("data-on")).toBe("");
     await page.mouse.up();

@@ -2,7 +2,7 @@
  * The page under adverse conditions: no network, a lost WebGL context, hostile names, reduced motion and assistive
  * technology.
  */
-import type { Page, WebSocketRoute } from "playwright-core";
+import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { DESKTOP, findViolations, forEachState, PHONE } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
@@ -28,14 +28,8 @@ const MAX_CLOCK_ERROR_S = 0.5;
 
 describeInBrowser("resilience", { server: "open" }, (fixture) => {
   test("offline, the motion plays on; after reconnecting it is in sync", async () => {
-    const sockets: WebSocketRoute[] = [];
-    const page = await fixture.open("", {
-      before: (page) =>
-        page.routeWebSocket(/\/v1\//, (socket) => {
-          socket.connectToServer();
-          sockets.push(socket);
-        }),
-    });
+    const proxy = await fixture.proxy();
+    const page = await fixture.open(`${proxy.url}/?session=${fixture.session}`);
     await waitForFirstPose(page);
     await waitForWelcome(page);
     // The clock's error bound and unfinished slew limit the precision of the position: both may shrink later.
@@ -48,10 +42,7 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
       }, MAX_CLOCK_ERROR_S)
       .then((handle) => handle.evaluate((found) => (found ? found.error : 0)));
     const start = await motionPosition(page);
-    await page.context().setOffline(true);
-    await waitForToast(page, "Connection lost, reconnecting", async () => {
-      for (const socket of sockets) await socket.close({ code: 1012, reason: "cut by the test" });
-    });
+    await waitForToast(page, "Connection lost, reconnecting", async () => proxy.setOffline(true));
     await page.locator('.health[data-state="lost"]').waitFor();
     expect(await page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(false);
     const cut = await motionPosition(page);
@@ -65,11 +56,11 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
     await waitForToast(page, "Reach for a string that someone else holds", () => page.keyboard.press("KeyR"));
     await page.getByText("Reach for a string that someone else holds").waitFor({ state: "detached" });
     expect(await page.getByText("Connection lost, reconnecting").isVisible()).toBe(true);
-    const socketCount = sockets.length;
-    await page.context().setOffline(false);
+    const { webSocketCount } = proxy;
+    proxy.setOffline(false);
     await page.locator('.health[data-state="good"]').waitFor();
     await page.getByText("Connection lost, reconnecting").waitFor({ state: "detached" });
-    expect(sockets.length).toBeGreaterThan(socketCount);
+    expect(proxy.webSocketCount).toBeGreaterThan(webSocketCount);
     await waitForWelcome(page);
     await expect.poll(() => page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(true);
     await page.waitForFunction(
