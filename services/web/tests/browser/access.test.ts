@@ -1,6 +1,7 @@
 /** Share links on a server that requires tokens: viewers get no controls and are notified when the link is revoked. */
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
+import { evaluateInEngine } from "./engine-probe";
 import { waitForFirstPose, waitForWelcome } from "./page-probe";
 
 interface Share {
@@ -25,8 +26,8 @@ describeInBrowser("access with links", { server: "guarded" }, (fixture) => {
     // Keys neither claim a limb nor pause.
     await page.keyboard.press("Digit2");
     await page.keyboard.press("Space");
-    const state = await page.evaluate(() => {
-      const { viewer, puppeteer } = window.bunraku;
+    const state = await evaluateInEngine(page, () => {
+      const { viewer, puppeteer } = globalThis.bunraku;
       return { id: puppeteer.id, playing: viewer.timeline?.playing };
     });
     expect(state).toEqual({ id: null, playing: true });

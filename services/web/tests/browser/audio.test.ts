@@ -1,23 +1,22 @@
-/** Audio playback: clicks at known motion times must be heard when the stage shows that time. */
+/**
+ * Audio playback: clicks at known motion times must be heard when the stage shows that time. Times are in milliseconds
+ * since the epoch: the performance clocks of the page and of its engine begin at different times.
+ */
 import type { Page } from "playwright-core";
 import { beforeAll, expect, test } from "vitest";
-import { describeInBrowser, PAGE_TIMEOUT_MS } from "./browser-suite";
+import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
+import { PAGE_TIMEOUT_MS } from "./chromium";
 import { countLoadedScripts } from "./embedding-page";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import { waitForFirstPose } from "./page-probe";
 import { encodeWav } from "./wav-file";
 
 declare global {
-  interface Window {
-    /** Filled by `recordClicks`. */
-    clicks: Clicks;
-  }
-}
-
-/** First audio frame and page time (ms) of each click, and page time and motion position (s) of each drawn frame. */
-interface Clicks {
-  heard: { frame: number; pageMs: number }[];
-  drawn: { pageMs: number; position: number }[];
+  /** In the page's realm: times of the clicks heard. Filled by `recordClicks`. */
+  var clickTimes: number[];
+  /** In the engine's realm. Filled by `recordFrames`. */
+  var drawnFrames: { time: number; position: number }[];
 }
 
 interface Conditions {
@@ -109,7 +108,7 @@ describeInBrowser("sound", { server: "open", browser: FLAGS, fullFrameRate: true
     const page = await open(motion.id, { hasDecoder: false });
     await waitForSound(page, true);
     // The audio player drives the stage's clock.
-    await page.waitForFunction(() => window.bunraku.viewer.leader !== null);
+    await waitInEngine(page, () => globalThis.bunraku.viewer.leader !== null);
     expect(await countLoadedScripts(page, /wasm-decoder/)).toBe(1);
   });
 
@@ -121,7 +120,7 @@ describeInBrowser("sound", { server: "open", browser: FLAGS, fullFrameRate: true
     await waitForSound(page, false);
     expect(await button.getAttribute("aria-pressed")).toBe("false");
     // Without sound the stage follows the viewer's clock.
-    expect(await page.evaluate(() => window.bunraku.viewer.leader?.(performance.now()))).toBeNull();
+    expect(await evaluateInEngine(page, () => globalThis.bunraku.viewer.leader?.(performance.now()))).toBeNull();
     await page.keyboard.press("KeyM");
     await waitForSound(page, true);
     expect(await button.getAttribute("aria-pressed")).toBe("true");
@@ -147,20 +146,18 @@ describeInBrowser("sound", { server: "open", browser: FLAGS, fullFrameRate: true
 
   /** Return by how much the stage leads the sound at each click, in milliseconds. */
   async function measureSyncErrors(page: Page): Promise<number[]> {
+    await evaluateInEngine(page, recordFrames);
+    await waitInEngine(page, () => globalThis.drawnFrames.length > 0);
     await page.evaluate(recordClicks);
-    await page.waitForFunction((count) => {
-      const { heard, drawn } = window.clicks;
-      return (
-        heard.filter(({ pageMs }) => pageMs > drawn[0]?.pageMs).length >= count &&
-        (drawn.at(-1)?.pageMs ?? 0) > heard[heard.length - 1].pageMs
-      );
-    }, CLICK_COUNT);
-    const { heard, drawn } = await page.evaluate(() => window.clicks);
-    return heard.flatMap(({ pageMs }) => {
-      const after = drawn.findIndex((frame) => frame.pageMs >= pageMs);
+    await page.waitForFunction((count) => globalThis.clickTimes.length >= count, CLICK_COUNT);
+    const heard = await page.evaluate(() => globalThis.clickTimes);
+    await waitInEngine(page, (last) => globalThis.drawnFrames.at(-1)!.time > last, heard[heard.length - 1]);
+    const drawn = await evaluateInEngine(page, () => globalThis.drawnFrames);
+    return heard.flatMap((time) => {
+      const after = drawn.findIndex((frame) => frame.time >= time);
       if (after < 1) return [];
       const [previous, next] = [drawn[after - 1], drawn[after]];
-      const fraction = (pageMs - previous.pageMs) / (next.pageMs - previous.pageMs);
+      const fraction = (time - previous.time) / (next.time - previous.time);
       const moved = next.position - previous.position;
       // The loop restarted between the two frames.
       const position =
@@ -185,17 +182,21 @@ function createClicks(seconds: number): Uint8Array<ArrayBuffer> {
   return encodeWav([sound, sound], SAMPLE_RATE_HZ);
 }
 
-/** In the page: record the clicks in the audio output and the position of each drawn frame. */
-async function recordClicks(): Promise<void> {
-  const { viewer, listening } = window.bunraku;
-  const { context, output } = listening.speaker!;
-  const clicks: Clicks = { heard: [], drawn: [] };
-  Object.assign(window, { clicks });
+/** In the engine: record the time and the motion position, in seconds, of each drawn frame. */
+function recordFrames(): void {
+  const { viewer } = globalThis.bunraku;
+  globalThis.drawnFrames = [];
   const poseAt = viewer.poseAt.bind(viewer);
   viewer.poseAt = (now) => {
-    clicks.drawn.push({ pageMs: now, position: viewer.positionAt(now) });
+    globalThis.drawnFrames.push({ time: performance.timeOrigin + now, position: viewer.positionAt(now) });
     return poseAt(now);
   };
+}
+
+/** In the page: record the clicks in the audio output. */
+async function recordClicks(): Promise<void> {
+  const { context, output } = window.bunraku.listening.speaker!;
+  globalThis.clickTimes = [];
   const tap = `registerProcessor("tap", class extends AudioWorkletProcessor {
     quiet = 0;
     process([input]) {
@@ -217,7 +218,10 @@ async function recordClicks(): Promise<void> {
       const { contextTime = 0, performanceTime = 0 } = context.getOutputTimestamp();
       // Report the click only after the device has played it.
       if (contextTime < frame / context.sampleRate) requestAnimationFrame(report);
-      else clicks.heard.push({ frame, pageMs: performanceTime + (frame / context.sampleRate - contextTime) * 1000 });
+      else
+        globalThis.clickTimes.push(
+          performance.timeOrigin + performanceTime + (frame / context.sampleRate - contextTime) * 1000,
+        );
     };
     report();
   };

@@ -8,6 +8,7 @@ import { mixamoName } from "../avatar/figure-bones";
 import { createFigureFile, type FigureOptions } from "../avatar/figure-files";
 import { findViolations } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   LEFT_HAND,
   pauseAtStart,
@@ -53,9 +54,7 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     );
     expect(await page.getByRole("radio", { name: "mine" }).isChecked()).toBe(true);
     await waitForFirstPose(page);
-    expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") === undefined)).toBe(
-      true,
-    );
+    await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") === undefined);
     expect(await limbAngleError(page)).toBeLessThan(1);
     await page.keyboard.press("Escape");
 
@@ -76,16 +75,16 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     await waitForFirstPose(page);
     await page.keyboard.press("KeyL");
     await page.getByRole("radio", { name: "Boxes" }).waitFor();
-    await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("leftHand") !== undefined);
+    await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("leftHand") !== undefined);
     expect(await limbAngleError(page)).toBeLessThan(1);
     await page.getByRole("radio", { name: "The puppet" }).check();
-    await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
+    await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
     await waitForToast(page, "Old boxes dances here", () => drop(page, "old.vrm", { vrm: 0, dressed: true }));
     expect(await textureWidths(page)).toEqual([2]);
     expect(await limbAngleError(page)).toBeLessThan(1);
     await page.getByRole("button", { name: "Remove the avatar Old boxes" }).click();
     await page.getByRole("radio", { name: "The puppet" }).waitFor({ state: "hidden" });
-    await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
+    await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
     await expect.poll(() => storedFileCount(page)).toBe(0);
     expect(await page.evaluate(() => localStorage.getItem("bunraku.avatar"))).toBe(null);
   });
@@ -97,9 +96,12 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     await page.getByRole("alert").getByText("missing bones: left lower arm, left hand").waitFor();
     await dropBytes(page, "cube.glb", [1, 2, 3]);
     await page.getByRole("alert").getByText("cube.glb: Not a GLB file").waitFor();
-    expect(await page.evaluate(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined)).toBe(
-      true,
-    );
+    expect(
+      await evaluateInEngine(
+        page,
+        () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined,
+      ),
+    ).toBe(true);
   });
 
   test("each performer can have its own avatar", async () => {
@@ -144,13 +146,16 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     await waitForPerformers(page, 2);
     expect(await puppetFlags(page)).toEqual([false, false]);
     await section.getByRole("radio", { name: "The puppet" }).check();
-    await page.waitForFunction(() => window.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
+    await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
     expect(await puppetFlags(page)).toEqual([true, false]);
 
     await page.reload();
     await waitForFirstPose(page);
     await waitForPerformers(page, 2);
-    await page.waitForFunction(() => window.bunraku.stage.performers[1]?.group.getObjectByName("figure") === undefined);
+    await waitInEngine(
+      page,
+      () => globalThis.bunraku.stage.performers[1]?.group.getObjectByName("figure") === undefined,
+    );
     await page.keyboard.press("KeyL");
     await section.getByRole("radio", { name: "Boxes" }).waitFor();
     expect(await section.getByRole("radio", { name: "Boxes" }).isChecked()).toBe(false);
@@ -163,14 +168,14 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
 
 /** Return for each performer whether it is drawn as the puppet. */
 function puppetFlags(page: Page): Promise<boolean[]> {
-  return page.evaluate(() =>
-    window.bunraku.stage.performers.map(({ group }) => group.getObjectByName("figure") !== undefined),
+  return evaluateInEngine(page, () =>
+    globalThis.bunraku.stage.performers.map(({ group }) => group.getObjectByName("figure") !== undefined),
   );
 }
 
 /** Return the horizontal screen positions of the performers' heads, in CSS pixels. */
 function headPositions(page: Page): Promise<number[]> {
-  return page.evaluate(() => window.bunraku.stage.faceBoxes.map(({ left, right }) => (left + right) / 2));
+  return evaluateInEngine(page, () => globalThis.bunraku.stage.faceBoxes.map(({ left, right }) => (left + right) / 2));
 }
 
 /** Drag a left hand to a reachable point beside and below its shoulder, and wait until it arrives. */
@@ -187,15 +192,16 @@ async function dragHand(page: Page, hand: number): Promise<void> {
     ) / 0.6;
   const to = { x: shoulder.x + 0.38 * scale, y: shoulder.y + 0.1 * scale };
   await page.mouse.move(to.x, to.y, { steps: 8 });
-  await page.waitForFunction((limb) => window.bunraku.hands.source(limb) === "pointer", hand);
+  await waitInEngine(page, (limb) => globalThis.bunraku.hands.source(limb) === "pointer", hand);
   await waitUntilSettled(page, () => ringPosition(page, hand), 0.3);
   await expect.poll(() => targetDistance(page, hand)).toBeLessThan(0.03);
 }
 
 /** Return the position of a performer's left wrist in world coordinates, in metres. */
 function leftWrist(page: Page, performer: number): Promise<number[]> {
-  return page.evaluate(
-    (performer) => window.bunraku.stage.performers[performer].joint("l_wrist").elements.slice(12, 15),
+  return evaluateInEngine(
+    page,
+    (performer) => globalThis.bunraku.stage.performers[performer].joint("l_wrist").elements.slice(12, 15),
     performer,
   );
 }
@@ -221,40 +227,44 @@ async function dropBytes(page: Page, name: string, bytes: number[]): Promise<voi
 /** Return the largest angle between a limb of an avatar and the same limb of the streamed motion, in degrees. */
 async function limbAngleError(page: Page, performer = 0): Promise<number> {
   await waitForDraw(page);
-  return page.evaluate((performer) => {
-    const { performers, rig } = window.bunraku.stage;
-    const puppet = performers[performer];
-    if (!puppet) throw new Error(`No performer ${performer} on the stage`);
-    const positionOf = (matrix: { elements: number[] }) => rig.group.position.clone().fromArray(matrix.elements, 12);
-    const avatarNode = (...names: string[]) => {
-      const found = names.map((name) => puppet.group.getObjectByName(name)).find((node) => node);
-      if (!found) throw new Error(`Avatar has no node ${names.join(" or ")}`);
-      return positionOf(found.matrixWorld);
-    };
-    const angles = (["left", "right"] as const).flatMap((side) => {
-      const [mixamoPrefix, s] = [`mixamorig${side === "left" ? "Left" : "Right"}`, side[0]];
-      const limbs = [
-        ["UpperArm", "Arm", "shoulder"],
-        ["LowerArm", "ForeArm", "elbow"],
-        ["Hand", "Hand", "wrist"],
-      ].concat([
-        ["UpperLeg", "UpLeg", "hip"],
-        ["LowerLeg", "Leg", "knee"],
-        ["Foot", "Foot", "ankle"],
-      ]);
-      return [0, 1, 3, 4].map((k) => {
-        const [a, b] = [limbs[k], limbs[k + 1]];
-        const actual = avatarNode(`${side}${b[0]}`, `${mixamoPrefix}${b[1]}`)
-          .sub(avatarNode(`${side}${a[0]}`, `${mixamoPrefix}${a[1]}`))
-          .normalize();
-        const expected = positionOf(puppet.joint(`${s}_${b[2]}`))
-          .sub(positionOf(puppet.joint(`${s}_${a[2]}`)))
-          .normalize();
-        return Math.acos(Math.min(1, actual.dot(expected)));
+  return evaluateInEngine(
+    page,
+    (performer) => {
+      const { performers, rig } = globalThis.bunraku.stage;
+      const puppet = performers[performer];
+      if (!puppet) throw new Error(`No performer ${performer} on the stage`);
+      const positionOf = (matrix: { elements: number[] }) => rig.group.position.clone().fromArray(matrix.elements, 12);
+      const avatarNode = (...names: string[]) => {
+        const found = names.map((name) => puppet.group.getObjectByName(name)).find((node) => node);
+        if (!found) throw new Error(`Avatar has no node ${names.join(" or ")}`);
+        return positionOf(found.matrixWorld);
+      };
+      const angles = (["left", "right"] as const).flatMap((side) => {
+        const [mixamoPrefix, s] = [`mixamorig${side === "left" ? "Left" : "Right"}`, side[0]];
+        const limbs = [
+          ["UpperArm", "Arm", "shoulder"],
+          ["LowerArm", "ForeArm", "elbow"],
+          ["Hand", "Hand", "wrist"],
+        ].concat([
+          ["UpperLeg", "UpLeg", "hip"],
+          ["LowerLeg", "Leg", "knee"],
+          ["Foot", "Foot", "ankle"],
+        ]);
+        return [0, 1, 3, 4].map((k) => {
+          const [a, b] = [limbs[k], limbs[k + 1]];
+          const actual = avatarNode(`${side}${b[0]}`, `${mixamoPrefix}${b[1]}`)
+            .sub(avatarNode(`${side}${a[0]}`, `${mixamoPrefix}${a[1]}`))
+            .normalize();
+          const expected = positionOf(puppet.joint(`${s}_${b[2]}`))
+            .sub(positionOf(puppet.joint(`${s}_${a[2]}`)))
+            .normalize();
+          return Math.acos(Math.min(1, actual.dot(expected)));
+        });
       });
-    });
-    return (Math.max(...angles) * 180) / Math.PI;
-  }, performer);
+      return (Math.max(...angles) * 180) / Math.PI;
+    },
+    performer,
+  );
 }
 
 /** Return the number of files in the page's IndexedDB. */
@@ -274,9 +284,9 @@ function storedFileCount(page: Page): Promise<number> {
 
 /** Return the widths of the avatar's textures, in pixels. */
 function textureWidths(page: Page): Promise<number[]> {
-  return page.evaluate(() => {
+  return evaluateInEngine(page, () => {
     const found = new Set<{ width: number }>();
-    window.bunraku.stage.puppet?.group.traverse((object) => {
+    globalThis.bunraku.stage.puppet?.group.traverse((object) => {
       const { material = [] } = object as unknown as { material?: object | object[] };
       for (const { map } of [material].flat() as { map?: { image: { width: number } } | null }[])
         if (map) found.add(map.image);
@@ -287,9 +297,10 @@ function textureWidths(page: Page): Promise<number[]> {
 
 /** Return the screen position of an avatar's node, in CSS pixels. */
 function nodePosition(page: Page, name: string, performer: number): Promise<{ x: number; y: number }> {
-  return page.evaluate(
+  return evaluateInEngine(
+    page,
     ({ name, performer }) => {
-      const { stage } = window.bunraku;
+      const { stage } = globalThis.bunraku;
       const node = stage.performers[performer]?.group.getObjectByName(name);
       if (!node) throw new Error(`Avatar has no node ${name}`);
       return stage.toScreen(stage.rig.group.position.clone().fromArray(node.matrixWorld.elements, 12));
@@ -300,10 +311,14 @@ function nodePosition(page: Page, name: string, performer: number): Promise<{ x:
 
 /** Return the distance of a hand from its target, in metres. */
 function targetDistance(page: Page, hand: number): Promise<number> {
-  return page.evaluate((hand) => {
-    const { stage, hands } = window.bunraku;
-    const to = hands.pullTarget(hand);
-    if (!to) throw new Error("The limb has no target");
-    return stage.performers[hand >> 2].handle(hand & 3, to.clone()).distanceTo(to);
-  }, hand);
+  return evaluateInEngine(
+    page,
+    (hand) => {
+      const { stage, hands } = globalThis.bunraku;
+      const to = hands.pullTarget(hand);
+      if (!to) throw new Error("The limb has no target");
+      return stage.performers[hand >> 2].handle(hand & 3, to.clone()).distanceTo(to);
+    },
+    hand,
+  );
 }

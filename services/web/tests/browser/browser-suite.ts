@@ -2,13 +2,10 @@
 import { randomUUID } from "node:crypto";
 import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, describe, inject, onTestFinished } from "vitest";
-import { chromiumPath, connectToChromium } from "./chromium";
+import { chromiumPath, connectToChromium, PAGE_TIMEOUT_MS } from "./chromium";
 import { type ConnectionProxy, startProxy } from "./connection-proxy";
 import type { ServerKind, SharedServer } from "./shared-resources";
-import { SLOW_FRAME_INTERVAL_MS, slowDownDisplay } from "./slow-display";
-
-/** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
-export const PAGE_TIMEOUT_MS = 120_000;
+import { limitFrameRate } from "./slow-display";
 
 export interface OpenOptions extends BrowserContextOptions {
   /** Called with the page before it navigates. */
@@ -131,7 +128,7 @@ export function describeInBrowser(
         page.on("pageerror", (error) => {
           throw error;
         });
-        if (!fullFrameRate) await page.addInitScript(slowDownDisplay, SLOW_FRAME_INTERVAL_MS);
+        if (!fullFrameRate) await limitFrameRate(page);
         await before?.(page);
         const url = pageAddress(address, server.url, session);
         // A page whose address names no session does this itself.

@@ -2,6 +2,9 @@
 import { existsSync } from "node:fs";
 import { type Browser, type BrowserServer, type LaunchOptions, chromium as playwright } from "playwright-core";
 
+/** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
+export const PAGE_TIMEOUT_MS = 120_000;
+
 /** Return the path of the installed Chromium (or `CHROMIUM`), or null if there is none. */
 export function chromiumPath(): string | null {
   const paths = [process.env["CHROMIUM"], "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];

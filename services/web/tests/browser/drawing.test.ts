@@ -1,6 +1,7 @@
 /** What is drawn, and when: without a graphics processor each frame counts, and on a phone each one costs battery. */
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import { LEFT_HAND, pauseAtStart, ringPosition, waitForFirstPose } from "./page-probe";
 
 /** Callbacks without a frame after which a stage counts as still. */
@@ -11,34 +12,36 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
     const page = await open("", { colorScheme: "dark" });
     await waitForFirstPose(page);
     await pauseAtStart(page);
-    await page.waitForFunction(() => {
-      const { domElement } = window.bunraku.stage.renderer;
-      return domElement.width === domElement.clientWidth;
-    });
-    await page.waitForFunction((callbacks) => {
-      const { renderer } = window.bunraku.stage;
-      return new Promise<boolean>((resolve) => {
-        const { frame } = renderer.info.render;
-        let left = callbacks;
-        const step = () => {
-          if (renderer.info.render.frame !== frame) resolve(false);
-          else if (--left > 0) requestAnimationFrame(step);
-          else resolve(true);
-        };
-        requestAnimationFrame(step);
-      });
-    }, STILL_CALLBACKS);
-    const frame = await page.evaluate(() => window.bunraku.stage.renderer.info.render.frame);
+    const width = await page.locator("#stage").evaluate((canvas) => canvas.clientWidth);
+    await waitInEngine(page, (width) => globalThis.bunraku.stage.renderer.domElement.width === width, width);
+    await waitInEngine(
+      page,
+      (callbacks) => {
+        const { renderer } = globalThis.bunraku.stage;
+        return new Promise<boolean>((resolve) => {
+          const { frame } = renderer.info.render;
+          let left = callbacks;
+          const step = () => {
+            if (renderer.info.render.frame !== frame) resolve(false);
+            else if (--left > 0) requestAnimationFrame(step);
+            else resolve(true);
+          };
+          requestAnimationFrame(step);
+        });
+      },
+      STILL_CALLBACKS,
+    );
+    const frame = await evaluateInEngine(page, () => globalThis.bunraku.stage.renderer.info.render.frame);
     const ring = await ringPosition(page, LEFT_HAND);
     await page.mouse.move(ring.x, ring.y);
-    await page.waitForFunction((frame) => window.bunraku.stage.renderer.info.render.frame > frame, frame);
+    await waitInEngine(page, (frame) => globalThis.bunraku.stage.renderer.info.render.frame > frame, frame);
   });
 
   test("edges are smooth without a graphics processor", async () => {
     const page = await open("", { colorScheme: "dark" });
     await waitForFirstPose(page);
-    const { smoothed, unsmoothed } = await page.evaluate(async () => {
-      const { stage } = window.bunraku;
+    const { smoothed, unsmoothed } = await evaluateInEngine(page, async () => {
+      const { stage } = globalThis.bunraku;
       const { renderer, scene, audience } = stage;
       const canvas = renderer.domElement;
       /** Count neighbours in a row whose luma differs by more than a third of the range. */

@@ -7,6 +7,7 @@ import { expect, test } from "vitest";
 import { JOINTS } from "../../src/motion/skeleton";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   clickInToast,
   jointPosition,
@@ -106,8 +107,9 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
         positions.map((position, joint) => position.distanceTo(copy[frame][joint])),
       ),
     );
-    const statedError = await page.evaluate(
-      () => Math.max(0, ...window.bunraku.viewer.ladder.slice(-1).map(({ max }) => max)) / 1000,
+    const statedError = await evaluateInEngine(
+      page,
+      () => Math.max(0, ...globalThis.bunraku.viewer.ladder.slice(-1).map(({ max }) => max)) / 1000,
     );
     expect(statedError).toBeGreaterThan(0);
     expect(statedError).toBeLessThan(0.001);
@@ -138,7 +140,7 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
     await uploadMotion(page, "pair", createBowingBvh(45));
     const alone = jointPositionsIn(await downloadMotion(page, "pair", "BVH"));
     await page.getByRole("button", { name: "Add pair to the stage" }).click();
-    await page.waitForFunction(() => window.bunraku.stage.performers.length === 2);
+    await waitInEngine(page, () => globalThis.bunraku.stage.performers.length === 2);
     const glb = await downloadMotion(page, "pair × 2", "GLB");
     expect(glb.name).toBe("pair × 2.glb");
     const { nodes, skins } = parseGlbJson(glb) as { nodes: { name: string }[]; skins: unknown[] };
@@ -151,11 +153,11 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
     expect(bvh.name).toBe("pair × 2, Dancer 2.bvh");
 
     // The same motion at the placement of the second performer.
-    const { x, z, turn } = await page.evaluate(() => ({
+    const { x, z, turn } = await evaluateInEngine(page, () => ({
       x: 0,
       z: 0,
       turn: 0,
-      ...window.bunraku.viewer.performers[1]?.placement,
+      ...globalThis.bunraku.viewer.performers[1]?.placement,
     }));
     expect(Math.hypot(x, z)).toBeGreaterThan(0.3);
     const placed = jointPositionsIn(bvh);
@@ -170,8 +172,8 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
     expect(maxError).toBeLessThan(1e-4);
     // It matches the drawn pose, within the error of any bitrate level.
     await pauseAtStart(page);
-    const [root, levelError] = await page.evaluate(() => {
-      const { stage, viewer } = window.bunraku;
+    const [root, levelError] = await evaluateInEngine(page, () => {
+      const { stage, viewer } = globalThis.bunraku;
       return [
         stage.performers[1].joint("humanoid_root").elements.slice(12, 15),
         Math.max(...viewer.ladder.map(({ max }) => max)) / 1000,
@@ -205,9 +207,10 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
     await waitForHold(page, LEFT_HAND);
     const from = await jointPosition(page, "l_wrist");
     await page.keyboard.down("KeyW");
-    await page.waitForFunction(
+    await waitInEngine(
+      page,
       (height) =>
-        (window.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13] ?? 0) > height + 0.15,
+        (globalThis.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13] ?? 0) > height + 0.15,
       from[1],
     );
     await page.keyboard.up("KeyW");
@@ -240,8 +243,8 @@ describeInBrowser("exports", { server: "open" }, (fixture) => {
 
 /** Return the stage's materials, shadows and environment, which taking a picture changes temporarily. */
 function drawSettings(page: Page) {
-  return page.evaluate(() => {
-    const { scene } = window.bunraku.stage;
+  return evaluateInEngine(page, () => {
+    const { scene } = globalThis.bunraku.stage;
     const kinds: string[] = [];
     scene.traverse((object) => {
       const { material, castShadow } = object as { material?: { type: string } } & typeof object;

@@ -2,6 +2,7 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   clickInToast,
   jointPosition,
@@ -90,7 +91,7 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     await pad.getByRole("button", { name: "Up" }).focus();
     await page.keyboard.down("Space");
     // High enough to move down again below.
-    await page.waitForFunction(leftWristMoved, { from: wrist, minimum: 0.15 });
+    await waitInEngine(page, leftWristMoved, { from: wrist, minimum: 0.15 });
     await page.keyboard.up("Space");
     await waitUntilStill(page);
 
@@ -98,7 +99,7 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     const down = pad.getByRole("button", { name: "Down" });
     await down.hover();
     await page.mouse.down();
-    await page.waitForFunction(leftWristMoved, { from: raised, minimum: 0.05 });
+    await waitInEngine(page, leftWristMoved, { from: raised, minimum: 0.05 });
     const before = proxy.webSocketCount;
     await waitForToast(page, "Connection lost, reconnecting", async () => proxy.cutWebSockets(/\/stream/));
     await expect.poll(() => proxy.webSocketCount).toBeGreaterThan(before);
@@ -126,7 +127,7 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     const wrist = await jointHeight(page, "l_wrist");
     await setGamepad(page, { axis: [1, -0.9] });
     await waitForHold(page, LEFT_HAND);
-    await page.waitForFunction(leftWristMoved, { from: wrist, minimum: 0.05 });
+    await waitInEngine(page, leftWristMoved, { from: wrist, minimum: 0.05 });
     await setGamepad(page, { axis: [1, 0] });
     await waitForRelease(page, LEFT_HAND);
 
@@ -183,7 +184,7 @@ async function waitUntilReady(page: Page): Promise<void> {
 
 /** Return the input that controls the left hand on a page. */
 function controlSource(page: Page): Promise<string | null> {
-  return page.evaluate((limb) => window.bunraku.hands.source(limb), LEFT_HAND);
+  return evaluateInEngine(page, (limb) => globalThis.bunraku.hands.source(limb), LEFT_HAND);
 }
 
 /** Set an axis or a button of the page's gamepad and wait until it has been polled. */
@@ -209,9 +210,9 @@ async function jointHeight(page: Page, joint: string): Promise<number> {
   return (await jointPosition(page, joint))[1];
 }
 
-/** In the page: return whether the left wrist has moved vertically by at least `minimum` metres. */
+/** In the engine: return whether the left wrist has moved vertically by at least `minimum` metres. */
 function leftWristMoved({ from, minimum }: { from: number; minimum: number }): boolean {
-  const at = window.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13];
+  const at = globalThis.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13];
   return at !== undefined && Math.abs(at - from) >= minimum;
 }
 

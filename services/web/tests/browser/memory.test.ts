@@ -1,24 +1,24 @@
 /** Memory of the page after changes of the motion. */
-import type { CDPSession, Page } from "playwright-core";
+import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
+import { collectGarbage, openThreadProtocols, type ThreadProtocol } from "./engine-protocol";
 import { waitForFirstPose, waitForWelcome } from "./page-probe";
 
 /** Changes of the motion after each has been played once. */
 const CHANGES = 6;
 
 declare global {
-  interface Window {
-    /** Puppets and figures that were replaced. */
-    replaced: WeakRef<object>[];
-  }
+  /** In the engine's realm: puppets and figures that were replaced. */
+  var replaced: WeakRef<object>[];
 }
 
 describeInBrowser("memory", { server: "open" }, (fixture) => {
   test("replaced performers are freed from the heap and the graphics memory", async () => {
     const page = await fixture.open("", { viewport: { width: 260, height: 220 } });
-    const protocol = await page.context().newCDPSession(page);
+    const threads = await openThreadProtocols(page);
     await waitForFirstPose(page);
     await waitForWelcome(page);
     const [demo, uploaded] = ["Sanba", "memorable bows"];
@@ -29,17 +29,17 @@ describeInBrowser("memory", { server: "open" }, (fixture) => {
     await waitForFirstPose(page);
     await playMotion(page, demo);
     const before = await graphicsMemory(page);
-    await page.evaluate(() => (window.replaced = []));
+    await evaluateInEngine(page, () => void (globalThis.replaced = []));
     for (let nth = 0; nth < CHANGES; nth++) {
-      await page.evaluate(() => {
-        const { stage, viewer } = window.bunraku;
-        for (const object of [stage.puppet, viewer.figure]) if (object) window.replaced.push(new WeakRef(object));
+      await evaluateInEngine(page, () => {
+        const { stage, viewer } = globalThis.bunraku;
+        for (const object of [stage.puppet, viewer.figure]) if (object) globalThis.replaced.push(new WeakRef(object));
       });
       await playMotion(page, nth % 2 === 0 ? uploaded : demo);
     }
-    expect(await page.evaluate(() => window.replaced.length)).toBe(2 * CHANGES);
+    expect(await evaluateInEngine(page, () => globalThis.replaced.length)).toBe(2 * CHANGES);
     expect(await graphicsMemory(page)).toEqual(before);
-    await expect.poll(() => reachableCount(page, protocol)).toBe(0);
+    await expect.poll(() => reachableCount(page, threads)).toBe(0);
   });
 });
 
@@ -56,16 +56,16 @@ async function playMotion(page: Page, name: string): Promise<void> {
 
 /** Return three.js's counts of graphics objects after everything has been drawn. */
 async function graphicsMemory(page: Page): Promise<Record<string, number>> {
-  const frame = await page.evaluate(() => window.bunraku.stage.renderer.info.render.frame);
-  await page.waitForFunction((frame) => window.bunraku.stage.renderer.info.render.frame > frame + 1, frame);
-  return page.evaluate(() => {
-    const { memory, programs } = window.bunraku.stage.renderer.info;
+  const frame = await evaluateInEngine(page, () => globalThis.bunraku.stage.renderer.info.render.frame);
+  await waitInEngine(page, (frame) => globalThis.bunraku.stage.renderer.info.render.frame > frame + 1, frame);
+  return evaluateInEngine(page, () => {
+    const { memory, programs } = globalThis.bunraku.stage.renderer.info;
     return { ...memory, programs: programs?.length ?? 0 };
   });
 }
 
 /** Return the number of replaced objects that are still reachable after a garbage collection. */
-async function reachableCount(page: Page, protocol: CDPSession): Promise<number> {
-  await protocol.send("HeapProfiler.collectGarbage");
-  return page.evaluate(() => window.replaced.filter((reference) => reference.deref()).length);
+async function reachableCount(page: Page, threads: readonly ThreadProtocol[]): Promise<number> {
+  await collectGarbage(threads);
+  return evaluateInEngine(page, () => globalThis.replaced.filter((reference) => reference.deref()).length);
 }

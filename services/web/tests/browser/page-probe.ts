@@ -1,17 +1,6 @@
-/** Waits and measurements on the page's state, read from `window.bunraku`. */
+/** Waits and measurements on the state of a page and its engine. */
 import type { Page } from "playwright-core";
-import type { SoundController } from "../../src/app/sound-controller";
-import type { Puppeteer } from "../../src/client/puppeteer";
-import type { Viewer } from "../../src/client/viewer";
-import type { LimbController } from "../../src/input/limb-controller";
-import type { Stage } from "../../src/stage/stage";
-
-declare global {
-  interface Window {
-    /** Missing or incomplete until the page has started. */
-    bunraku: { stage: Stage; viewer: Viewer; puppeteer: Puppeteer; hands: LimbController; listening: SoundController };
-  }
-}
+import { engineWorker, evaluateInEngine, waitForFrames, waitInEngine } from "./engine-probe";
 
 export type Position = [number, number, number];
 
@@ -20,9 +9,10 @@ export const [LEFT_HAND, RIGHT_LEG] = [0, 3];
 
 /** Wait until the first pose is drawn. The first frame compiles the shaders, which blocks a slow machine. */
 export async function waitForFirstPose(page: Page): Promise<void> {
-  await page.waitForFunction(
-    () => window.bunraku?.stage?.puppet?.group.visible && window.bunraku.stage.hasDrawnPerformer,
-  );
+  await waitInEngine(page, () => {
+    const stage = globalThis.bunraku?.stage;
+    return Boolean(stage?.puppet?.group.visible && stage.hasDrawnPerformer);
+  });
 }
 
 /**
@@ -39,8 +29,8 @@ export async function pauseAtStart(page: Page): Promise<void> {
     });
     if (!response.ok) throw new Error(await response.text());
   });
-  await page.waitForFunction(() => {
-    const { viewer } = window.bunraku;
+  await waitInEngine(page, () => {
+    const { viewer } = globalThis.bunraku;
     // The newest timeline takes effect some time after it was received.
     const timeline = viewer.timelineHistory.at(viewer.presentationTime(performance.now()));
     return timeline !== null && !timeline.playing && timeline.position === 0 && viewer.blocks[0] >= 0;
@@ -81,54 +71,67 @@ export async function clickInToast(page: Page, label: string, action: () => Prom
  * a second loses its limbs.
  */
 export async function stopDrawing(page: Page): Promise<void> {
-  await page.evaluate(() => void (window.bunraku.stage.renderer.render = () => undefined));
+  await evaluateInEngine(page, () => void (globalThis.bunraku.stage.renderer.render = () => undefined));
 }
 
 /** Wait for the session's Welcome message. After it, the page can claim limbs. */
 export async function waitForWelcome(page: Page): Promise<void> {
-  await page.waitForFunction(() => (window.bunraku?.puppeteer?.id ?? null) !== null);
+  await waitInEngine(page, () => (globalThis.bunraku?.puppeteer?.id ?? null) !== null);
 }
 
 /** Wait until the page's puppeteer holds a limb. */
 export async function waitForHold(page: Page, limb: number): Promise<void> {
-  await page.waitForFunction((limb) => window.bunraku.puppeteer.holds(limb), limb);
+  await waitInEngine(page, (limb) => globalThis.bunraku.puppeteer.holds(limb), limb);
 }
 
 /** Wait until no input of the page controls a limb. */
 export async function waitForRelease(page: Page, limb: number): Promise<void> {
-  await page.waitForFunction((limb) => window.bunraku.hands.source(limb) === null, limb);
+  await waitInEngine(page, (limb) => globalThis.bunraku.hands.source(limb) === null, limb);
 }
 
 /** Return the position of a joint in world coordinates, in metres. */
 export function jointPosition(page: Page, joint: string): Promise<Position> {
-  return page.evaluate((joint) => {
-    const at = window.bunraku.stage.scene.getObjectByName(joint)?.matrixWorld.elements;
-    if (!at) throw new Error(`Joint ${joint} is not in the scene`);
-    return [at[12], at[13], at[14]] as Position;
-  }, joint);
+  return evaluateInEngine(
+    page,
+    (joint) => {
+      const at = globalThis.bunraku.stage.scene.getObjectByName(joint)?.matrixWorld.elements;
+      if (!at) throw new Error(`Joint ${joint} is not in the scene`);
+      return [at[12], at[13], at[14]] as Position;
+    },
+    joint,
+  );
 }
 
 /** Return the screen position of a limb's ring, in CSS pixels. */
 export function ringPosition(page: Page, limb: number): Promise<{ x: number; y: number }> {
-  return page.evaluate((limb) => {
-    const { stage } = window.bunraku;
-    const puppet = stage.performers[limb >> 2];
-    if (!puppet) throw new Error(`No performer on the stage has limb ${limb}`);
-    return stage.toScreen(puppet.handle(limb & 3, stage.rig.group.position.clone()));
-  }, limb);
+  return evaluateInEngine(
+    page,
+    (limb) => {
+      const { stage } = globalThis.bunraku;
+      const puppet = stage.performers[limb >> 2];
+      if (!puppet) throw new Error(`No performer on the stage has limb ${limb}`);
+      return stage.toScreen(puppet.handle(limb & 3, stage.rig.group.position.clone()));
+    },
+    limb,
+  );
 }
 
 /** Wait until `count` performers are visible on the stage. */
 export async function waitForPerformers(page: Page, count: number): Promise<void> {
-  await page.waitForFunction(
-    (count) => window.bunraku.stage.performers.filter(({ group }) => group.visible).length === count,
+  await waitInEngine(
+    page,
+    (count) => globalThis.bunraku.stage.performers.filter(({ group }) => group.visible).length === count,
     count,
   );
 }
 
-/** Wait until the page has drawn its present state. */
-export function waitForDraw(page: Page): Promise<unknown> {
-  return page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
+/** Wait until the page and its engine have drawn their present state, and the page that of its engine. */
+export async function waitForDraw(page: Page): Promise<void> {
+  await waitForFrames(page);
+  const worker = engineWorker(page);
+  if (!worker) return;
+  await waitForFrames(worker);
+  await waitForFrames(page);
 }
 
 /**

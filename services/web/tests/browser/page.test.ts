@@ -3,6 +3,7 @@ import { join } from "node:path";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   jointPosition,
   LEFT_HAND,
@@ -68,7 +69,7 @@ describeInBrowser("page of an empty server", { server: "empty" }, ({ open }) => 
     await page.mouse.move(ring.x + 30, ring.y + drag / 2, { steps: 3 });
     await page.mouse.move(ring.x + 60, ring.y + drag, { steps: 3 });
     await waitForHold(page, LEFT_HAND);
-    await second.waitForFunction((limb) => Boolean(window.bunraku.viewer.presence?.limbs[limb]), LEFT_HAND);
+    await waitInEngine(second, (limb) => Boolean(globalThis.bunraku.viewer.presence?.limbs[limb]), LEFT_HAND);
     await waitForDistance(second, "l_wrist", motionPosition, 0.15, Infinity);
     // Both pages show the hand at the same position, within 6 cm of unfinished blending.
     await waitForDistance(second, "l_wrist", await settledPosition(page, "l_wrist"), 0, 0.06);
@@ -88,11 +89,12 @@ describeInBrowser("page", { server: "open" }, ({ open }) => {
     await page.keyboard.press("Space");
     await page.getByRole("button", { name: "Play", exact: true }).waitFor();
     await pauseAtStart(page);
-    await page.waitForFunction(() => window.bunraku.stage.hasMotionCamera);
-    const wasFollowing = await page.evaluate(() => window.bunraku.stage.followsMotionCamera);
+    await waitInEngine(page, () => globalThis.bunraku.stage.hasMotionCamera);
+    const wasFollowing = await evaluateInEngine(page, () => globalThis.bunraku.stage.followsMotionCamera);
     await page.keyboard.press("KeyC");
-    await page.waitForFunction(
-      (wasFollowing) => window.bunraku.stage.followsMotionCamera === !wasFollowing,
+    await waitInEngine(
+      page,
+      (wasFollowing) => globalThis.bunraku.stage.followsMotionCamera === !wasFollowing,
       wasFollowing,
     );
     await page.getByRole("button", { name: "Show's camera", pressed: !wasFollowing }).waitFor();
@@ -121,9 +123,10 @@ async function waitForDistance(
   minimum: number,
   maximum: number,
 ): Promise<void> {
-  await page.waitForFunction(
+  await waitInEngine(
+    page,
     ({ joint, origin, minimum, maximum }) => {
-      const at = window.bunraku.stage.scene.getObjectByName(joint)?.matrixWorld.elements;
+      const at = globalThis.bunraku.stage.scene.getObjectByName(joint)?.matrixWorld.elements;
       if (!at) return false;
       const distance = Math.hypot(at[12] - origin[0], at[13] - origin[1], at[14] - origin[2]);
       return distance >= minimum && distance <= maximum;

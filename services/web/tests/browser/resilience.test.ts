@@ -7,6 +7,7 @@ import { expect, test } from "vitest";
 import { DESKTOP, findViolations, forEachState, PHONE } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   LEFT_HAND,
   pauseAtStart,
@@ -33,25 +34,31 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
     await waitForFirstPose(page);
     await waitForWelcome(page);
     // The clock's error bound and unfinished slew limit the precision of the position: both may shrink later.
-    const clockError = await page
-      .waitForFunction((maxError) => {
-        const { clock } = window.bunraku.viewer;
+    const { clockError } = await waitInEngine(
+      page,
+      (maxError) => {
+        const { clock } = globalThis.bunraku.viewer;
         const slew = Math.abs(clock.slewedOffset(1000 * performance.now()) - clock.offset);
-        const error = (clock.errorBound + slew) / 1e6;
-        return error < maxError && { error };
-      }, MAX_CLOCK_ERROR_S)
-      .then((handle) => handle.evaluate((found) => (found ? found.error : 0)));
+        const clockError = (clock.errorBound + slew) / 1e6;
+        return clockError < maxError ? { clockError } : null;
+      },
+      MAX_CLOCK_ERROR_S,
+    );
     const start = await motionPosition(page);
     await waitForToast(page, "Connection lost, reconnecting", async () => proxy.setOffline(true));
     await page.locator('.health[data-state="lost"]').waitFor();
     expect(await page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(false);
     const cut = await motionPosition(page);
     // The buffer holds some seconds, in which the loop may restart.
-    await page.waitForFunction((from) => {
-      const { viewer } = window.bunraku;
-      const elapsed = viewer.positionAt(performance.now()) - from;
-      return elapsed - viewer.duration * Math.floor(elapsed / viewer.duration) > 1;
-    }, cut.position);
+    await waitInEngine(
+      page,
+      (from) => {
+        const { viewer } = globalThis.bunraku;
+        const elapsed = viewer.positionAt(performance.now()) - from;
+        return elapsed - viewer.duration * Math.floor(elapsed / viewer.duration) > 1;
+      },
+      cut.position,
+    );
     // A brief toast appears beside it and disappears.
     await waitForToast(page, "Reach for a string that someone else holds", () => page.keyboard.press("KeyR"));
     await page.getByText("Reach for a string that someone else holds").waitFor({ state: "detached" });
@@ -63,9 +70,10 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
     expect(proxy.webSocketCount).toBeGreaterThan(webSocketCount);
     await waitForWelcome(page);
     await expect.poll(() => page.getByRole("button", { name: "Take the left hand" }).isEnabled()).toBe(true);
-    await page.waitForFunction(
+    await waitInEngine(
+      page,
       ({ start, maxError }) => {
-        const { viewer } = window.bunraku;
+        const { viewer } = globalThis.bunraku;
         const now = performance.now();
         const error = viewer.positionAt(now) - start.position - (now - start.now) / 1000;
         return Math.abs(error - viewer.duration * Math.round(error / viewer.duration)) < maxError;
@@ -139,7 +147,7 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
   test("a restored WebGL context clears only its own notice", async () => {
     const page = await fixture.open("?session=no-such-session", { viewport: { width: 260, height: 220 } });
     await page.getByText("The session has ended").waitFor();
-    await page.waitForFunction(() => window.bunraku?.stage);
+    await waitInEngine(page, () => Boolean(globalThis.bunraku?.stage));
     await loseAndRestoreContext(page);
     expect(await page.getByText("The session has ended").isVisible()).toBe(true);
   });
@@ -171,10 +179,10 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
         .map((element) => element.className),
     );
     expect(animated).toEqual([]);
-    expect(await page.evaluate(() => window.bunraku.stage.strings.reducedMotion)).toBe(true);
+    expect(await evaluateInEngine(page, () => globalThis.bunraku.stage.strings.reducedMotion)).toBe(true);
     // The timeline takes effect some time after it was received.
-    await page.waitForFunction(() => {
-      const { viewer } = window.bunraku;
+    await waitInEngine(page, () => {
+      const { viewer } = globalThis.bunraku;
       return viewer.timelineHistory.at(viewer.presentationTime(performance.now()))?.playing === false;
     });
     const [first, second] = [await motionPosition(page), await waitForDraw(page).then(() => motionPosition(page))];
@@ -207,16 +215,16 @@ describeInBrowser("resilience", { server: "open" }, (fixture) => {
 
 /** Return the stage's position in the motion, in seconds, and the page time, in milliseconds. */
 function motionPosition(page: Page): Promise<{ position: number; now: number }> {
-  return page.evaluate(() => {
+  return evaluateInEngine(page, () => {
     const now = performance.now();
-    return { position: window.bunraku.viewer.positionAt(now), now };
+    return { position: globalThis.bunraku.viewer.positionAt(now), now };
   });
 }
 
 /** Return the position of the audience's camera in metres. It follows the performer slowly. */
 function cameraPosition(page: Page): Promise<[number, number, number]> {
-  return page.evaluate(() => {
-    const { elements } = window.bunraku.stage.audience.camera.matrixWorld;
+  return evaluateInEngine(page, () => {
+    const { elements } = globalThis.bunraku.stage.audience.camera.matrixWorld;
     return [elements[12], elements[13], elements[14]] as [number, number, number];
   });
 }
@@ -241,8 +249,8 @@ function overflowingElements(): string[] {
 /** Return the RGBA bytes of the second frame from now: the first may still prepare resources. */
 async function readFrame(page: Page): Promise<Uint8Array> {
   // As base64: an array of numbers takes Playwright seconds to transfer.
-  const pixels = await page.evaluate(() => {
-    const { renderer, scene, audience } = window.bunraku.stage;
+  const pixels = await evaluateInEngine(page, () => {
+    const { renderer, scene, audience } = globalThis.bunraku.stage;
     // A canvas keeps its frame only until the end of the task that drew it.
     renderer.render(scene, audience.camera);
     const gl = renderer.getContext();
@@ -256,12 +264,14 @@ async function readFrame(page: Page): Promise<Uint8Array> {
 
 /** Lose and restore the WebGL context, and wait for the page's notice to appear and disappear. */
 async function loseAndRestoreContext(page: Page): Promise<void> {
-  await page.evaluate(() => {
-    const contextLoss = window.bunraku.stage.renderer.getContext().getExtension("WEBGL_lose_context");
-    Object.assign(window, { contextLoss });
+  await evaluateInEngine(page, () => {
+    const contextLoss = globalThis.bunraku.stage.renderer.getContext().getExtension("WEBGL_lose_context");
+    Object.assign(globalThis, { contextLoss });
     contextLoss?.loseContext();
   });
   await page.getByText("The stage went dark").waitFor();
-  await page.evaluate(() => (window as unknown as { contextLoss: WEBGL_lose_context }).contextLoss.restoreContext());
+  await evaluateInEngine(page, () =>
+    (globalThis as unknown as { contextLoss: WEBGL_lose_context }).contextLoss.restoreContext(),
+  );
   await page.getByText("The stage went dark").waitFor({ state: "hidden" });
 }

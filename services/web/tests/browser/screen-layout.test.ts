@@ -4,7 +4,9 @@
  */
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
+import type { ScreenBox } from "../../src/stage/camera/screen-box";
 import { describeInBrowser } from "./browser-suite";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import { tapKey, waitForDraw, waitForFirstPose, waitForHold, waitForToast, waitForWelcome } from "./page-probe";
 
 /** Two phones in portrait and landscape orientation, and a low window. */
@@ -69,8 +71,10 @@ describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
     });
     await waitForFirstPose(page);
     await showFourPerformers(page);
-    const visibleFaces = () =>
-      page.evaluate(() => window.bunraku.stage.faceBoxes.map(({ left, right }) => left > 0 && right < innerWidth));
+    const visibleFaces = async () => {
+      const width = await page.evaluate(() => innerWidth);
+      return (await stageBoxes(page)).faces.map(({ left, right }) => left > 0 && right < width);
+    };
     // The third performer may be at the edge.
     await expect.poll(visibleFaces).toMatchObject({ 0: true, 1: true, 3: false });
     for (let number = 1; number <= 3; number++) await page.getByRole("button", { name: `Dancer ${number} of 4` }).tap();
@@ -80,7 +84,8 @@ describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
     const sheet = page.getByRole("complementary", { name: "Strings" });
     await page.getByRole("button", { name: "Dancer 4", exact: true }).waitFor();
     // The feet are visible too.
-    const floor = () => page.evaluate(() => window.bunraku.stage.toScreen(window.bunraku.stage.rig.group.position).y);
+    const floor = () =>
+      evaluateInEngine(page, () => globalThis.bunraku.stage.toScreen(globalThis.bunraku.stage.rig.group.position).y);
     await expect.poll(async () => (await floor()) < ((await sheet.boundingBox())?.y ?? 0)).toBe(true);
   });
 
@@ -109,8 +114,9 @@ describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
         await expect.poll(async () => (await panel.boundingBox())?.x).toBeLessThan(width - 300);
         const box = await panel.boundingBox();
         expect([box?.y, Math.round((box?.x ?? 0) + (box?.width ?? 0)), box?.height]).toEqual([0, width, height]);
-        await page.waitForFunction(
-          (left) => window.bunraku.stage.faceBoxes.every((face) => face.right < left),
+        await waitInEngine(
+          page,
+          (left) => globalThis.bunraku.stage.faceBoxes.every((face) => face.right < left),
           box?.x ?? 0,
         );
         expect(await findTargetProblems(page), `${width} x ${height}, ${name}`).toEqual([]);
@@ -125,7 +131,8 @@ describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
 
 /** Put four performers of the demo's motion on the stage. */
 async function showFourPerformers(page: Page): Promise<void> {
-  await page.evaluate(async () => {
+  const motion = await evaluateInEngine(page, () => globalThis.bunraku.viewer.motion);
+  await page.evaluate(async (motion) => {
     const request = async (method: string, path: string, body: object) => {
       const response = await fetch(path, {
         method,
@@ -135,61 +142,69 @@ async function showFourPerformers(page: Page): Promise<void> {
       if (!response.ok) throw new Error(await response.text());
       return response.json();
     };
-    const { motion } = window.bunraku.viewer;
     const { id } = await request("POST", `/v1/motions/${motion}/performers`, { motions: [motion, motion, motion] });
     await request("PATCH", `/v1/sessions/${new URLSearchParams(location.search).get("session")}`, {
       motion: id,
       playing: false,
       position: 0,
     });
-  });
-  await page.waitForFunction(() => window.bunraku.stage.performers.filter(({ group }) => group.visible).length === 4);
+  }, motion);
+  await waitInEngine(page, () => globalThis.bunraku.stage.performers.filter(({ group }) => group.visible).length === 4);
 }
 
 /** Claim the limbs that a page on a busy machine has lost, because it sent nothing for half a second. */
 function reclaimLostLimbs(page: Page): Promise<void> {
-  return page.evaluate(() => {
-    const { hands } = window.bunraku;
+  return evaluateInEngine(page, () => {
+    const { hands } = globalThis.bunraku;
     for (let limb = 0; limb < 16; limb++) if (!hands?.source(limb)) hands?.claim(limb, "velocity");
   });
 }
 
-/** Return the number of tags, and descriptions of the tags and toasts that cover something or leave the window. */
-function findCoveredElements(page: Page): Promise<{ tagCount: number; covered: string[] }> {
-  return page.evaluate(() => {
-    const { stage } = window.bunraku;
-    const boxes = (selector: string) =>
-      [...document.querySelectorAll(selector)]
-        .map((element) => [selector, element.getBoundingClientRect()] as const)
-        .filter(([, { width, height }]) => width > 0 && height > 0);
-    const tags = boxes(".tag");
-    const toasts = boxes(".toast");
-    const faces = stage.faceBoxes.map((face) => ["face", face] as const);
-    const bars = Array.from({ length: 16 }, (_, limb) => ["bar", stage.barBox(limb)] as const).filter(
-      ([, bar]) => bar !== null,
-    );
-    const parts = boxes(".brand, .header-right, .transport, .dock, .camera, .picture, .sound");
-    const problems: string[] = [];
-    const check = (
-      subjects: readonly (readonly [string, DOMRect])[],
-      others: readonly (readonly [string, { left: number; top: number; right: number; bottom: number } | null])[],
-    ) => {
-      for (const [name, a] of subjects) {
-        if (a.left < 0 || a.top < 0 || a.right > innerWidth || a.bottom > innerHeight)
-          problems.push(`${name} is out of the window`);
-        for (const [other, b] of others) {
-          if (!b || a === b) continue;
-          const overlaps =
-            Math.min(a.right, b.right) - Math.max(a.left, b.left) > 0.5 &&
-            Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 0.5;
-          if (overlaps) problems.push(`${name} covers ${other}`);
-        }
-      }
-    };
-    check(tags, [...tags, ...toasts, ...faces, ...bars, ...parts]);
-    check(toasts, [...toasts, ...faces]);
-    return { tagCount: tags.length, covered: problems };
+/** Return the boxes of the faces and of the control bars on the stage, in CSS pixels. */
+function stageBoxes(page: Page): Promise<{ faces: ScreenBox[]; bars: ScreenBox[] }> {
+  return evaluateInEngine(page, () => {
+    const { stage } = globalThis.bunraku;
+    const bars = Array.from({ length: 16 }, (_, limb) => stage.barBox(limb)).filter((bar) => bar !== null);
+    return { faces: stage.faceBoxes, bars };
   });
+}
+
+/** Return the number of tags, and descriptions of the tags and toasts that cover something or leave the window. */
+async function findCoveredElements(page: Page): Promise<{ tagCount: number; covered: string[] }> {
+  return page.evaluate(
+    (stage) => {
+      const boxes = (selector: string) =>
+        [...document.querySelectorAll(selector)]
+          .map((element) => [selector, element.getBoundingClientRect()] as const)
+          .filter(([, { width, height }]) => width > 0 && height > 0);
+      const tags = boxes(".tag");
+      const toasts = boxes(".toast");
+      const faces = stage.faces.map((face) => ["face", face] as const);
+      const bars = stage.bars.map((bar) => ["bar", bar] as const);
+      const parts = boxes(".brand, .header-right, .transport, .dock, .camera, .picture, .sound");
+      const problems: string[] = [];
+      const check = (
+        subjects: readonly (readonly [string, DOMRect])[],
+        others: readonly (readonly [string, ScreenBox])[],
+      ) => {
+        for (const [name, a] of subjects) {
+          if (a.left < 0 || a.top < 0 || a.right > innerWidth || a.bottom > innerHeight)
+            problems.push(`${name} is out of the window`);
+          for (const [other, b] of others) {
+            if (a === b) continue;
+            const overlaps =
+              Math.min(a.right, b.right) - Math.max(a.left, b.left) > 0.5 &&
+              Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top) > 0.5;
+            if (overlaps) problems.push(`${name} covers ${other}`);
+          }
+        }
+      };
+      check(tags, [...tags, ...toasts, ...faces, ...bars, ...parts]);
+      check(toasts, [...toasts, ...faces]);
+      return { tagCount: tags.length, covered: problems };
+    },
+    await stageBoxes(page),
+  );
 }
 
 /** Return descriptions of the controls that are too small for a finger, outside the window or overlapping. */

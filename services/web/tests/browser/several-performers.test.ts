@@ -3,6 +3,7 @@ import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { findViolations } from "./accessibility";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
+import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   LEFT_HAND,
   pauseAtStart,
@@ -34,7 +35,7 @@ describeInBrowser("several performers", { server: "open" }, (fixture) => {
 
   test("an added performer is controlled by pointer and keys, seen by others", async () => {
     const page = await open("Aiko");
-    const soloCamera = await page.evaluate(() => window.bunraku.stage.audience.camera.position.toArray());
+    const soloCamera = await evaluateInEngine(page, () => globalThis.bunraku.stage.audience.camera.position.toArray());
     expect(await page.locator(".next-dancer:visible, .dancers:visible").count()).toBe(0);
     await page.getByRole("button", { name: "Library", exact: true }).click();
     await addToStage(page, "Sanbasō, First Steps");
@@ -47,8 +48,12 @@ describeInBrowser("several performers", { server: "open" }, (fixture) => {
     expect(heads.left).toBeGreaterThan(-1);
     expect(heads.right).toBeLessThan(1);
     expect(heads.right - heads.left).toBeGreaterThan(0.5);
-    expect(await page.evaluate(() => window.bunraku.stage.renderer.info.memory.geometries)).toBeLessThan(12);
-    expect(await page.evaluate(() => window.bunraku.stage.audience.camera.position.toArray())).not.toEqual(soloCamera);
+    expect(await evaluateInEngine(page, () => globalThis.bunraku.stage.renderer.info.memory.geometries)).toBeLessThan(
+      12,
+    );
+    expect(await evaluateInEngine(page, () => globalThis.bunraku.stage.audience.camera.position.toArray())).not.toEqual(
+      soloCamera,
+    );
 
     const mateo = await open("Mateo");
     await waitForPerformers(mateo, 2);
@@ -69,10 +74,14 @@ describeInBrowser("several performers", { server: "open" }, (fixture) => {
     const before = await leftWrists(mateo);
     await page.mouse.move(ring.x - 15, ring.y - 25, { steps: 3 });
     await page.mouse.move(ring.x - 30, ring.y - 60, { steps: 3 });
-    await mateo.waitForFunction(([x, y, z]) => {
-      const at = window.bunraku.stage.performers[1].joint("l_wrist").elements;
-      return Math.hypot(at[12] - x, at[13] - y, at[14] - z) > 0.1;
-    }, before[1]);
+    await waitInEngine(
+      mateo,
+      ([x, y, z]) => {
+        const at = globalThis.bunraku.stage.performers[1].joint("l_wrist").elements;
+        return Math.hypot(at[12] - x, at[13] - y, at[14] - z) > 0.1;
+      },
+      before[1],
+    );
     expect((await leftWrists(mateo))[0]).toEqual(before[0]);
     await page.mouse.up();
     await waitForRelease(page, SECOND_PERFORMER + LEFT_HAND);
@@ -117,7 +126,7 @@ describeInBrowser("several performers", { server: "open" }, (fixture) => {
     await embedding.getByRole("button", { name: "Dancer 1 of 4: go to the next" }).click();
     await embedding.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
     await embedding.getByRole("button", { name: "Take the right leg of dancer 2" }).click();
-    await page.waitForFunction((limb) => window.bunraku.viewer.presence?.limbs[limb] !== null, SECOND_PERFORMER + 3);
+    await waitInEngine(page, (limb) => globalThis.bunraku.viewer.presence?.limbs[limb] !== null, SECOND_PERFORMER + 3);
   });
 });
 
@@ -131,8 +140,8 @@ async function addToStage(page: Page, name: string): Promise<void> {
 
 /** Return the horizontal range of the heads in normalised device coordinates (-1 to 1). */
 function headRange(page: Page): Promise<{ left: number; right: number }> {
-  return page.evaluate(() => {
-    const { stage } = window.bunraku;
+  return evaluateInEngine(page, () => {
+    const { stage } = globalThis.bunraku;
     const at = stage.performers.map(
       (performer) =>
         stage.rig.group.position
@@ -146,8 +155,8 @@ function headRange(page: Page): Promise<{ left: number; right: number }> {
 
 /** Return the positions of all performers' left wrists in world coordinates, in metres. */
 function leftWrists(page: Page): Promise<[number, number, number][]> {
-  return page.evaluate(() =>
-    window.bunraku.stage.performers.map((performer) => {
+  return evaluateInEngine(page, () =>
+    globalThis.bunraku.stage.performers.map((performer) => {
       const at = performer.joint("l_wrist").elements;
       return [at[12], at[13], at[14]] as [number, number, number];
     }),

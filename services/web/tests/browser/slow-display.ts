@@ -1,16 +1,23 @@
 /** Display with a low refresh rate. Software rendering at the full rate would take all processors. */
+import type { Page } from "playwright-core";
+import { installInRealms } from "./engine-probe";
 
 /** Interval between frames, in milliseconds. Pages stay well below the time after which they lose their limbs. */
-export const SLOW_FRAME_INTERVAL_MS = 100;
+const SLOW_FRAME_INTERVAL_MS = 100;
+
+/** Limit the frame rate of a page, before it navigates, and of its workers. */
+export function limitFrameRate(page: Page): Promise<void> {
+  return installInRealms(page, slowDownDisplay, SLOW_FRAME_INTERVAL_MS);
+}
 
 /**
- * In the page, before its scripts: leave `intervalMs` between the frames that run animation callbacks. The browser still
- * runs each callback, so timestamps and errors are its own.
+ * In a page before its scripts, or in a worker: leave `intervalMs` between the frames that run animation callbacks. The
+ * browser still runs each callback, so timestamps and errors are its own.
  */
-export function slowDownDisplay(intervalMs: number): void {
-  const request = window.requestAnimationFrame.bind(window);
-  const cancel = window.cancelAnimationFrame.bind(window);
-  const startTimer = window.setTimeout.bind(window);
+function slowDownDisplay(intervalMs: number): void {
+  const request = globalThis.requestAnimationFrame.bind(globalThis);
+  const cancel = globalThis.cancelAnimationFrame.bind(globalThis);
+  const startTimer = globalThis.setTimeout.bind(globalThis);
   const queued = new Map<number, FrameRequestCallback>();
   /** The browser's handles, by those of the page. */
   const requested = new Map<number, number>();
@@ -32,13 +39,13 @@ export function slowDownDisplay(intervalMs: number): void {
     queued.clear();
   }
 
-  window.requestAnimationFrame = (callback) => {
+  globalThis.requestAnimationFrame = (callback) => {
     queued.set(++lastHandle, callback);
     if (!isTimerRunning) startTimer(requestFrame, Math.max(0, lastFrameMs + intervalMs - performance.now()));
     isTimerRunning = true;
     return lastHandle;
   };
-  window.cancelAnimationFrame = (handle) => {
+  globalThis.cancelAnimationFrame = (handle) => {
     queued.delete(handle);
     const native = requested.get(handle);
     if (native !== undefined) cancel(native);

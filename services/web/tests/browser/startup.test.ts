@@ -2,6 +2,7 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
+import { waitInEngine } from "./engine-probe";
 import { waitForFirstPose } from "./page-probe";
 
 describeInBrowser("startup", { server: "open" }, ({ open }) => {
@@ -32,10 +33,10 @@ describeInBrowser("startup", { server: "open" }, ({ open }) => {
     for (const pattern of deferred)
       await expect.poll(() => requests.some((path) => pattern.test(path)), { timeout: 30_000 }).toBe(true);
     // The scenery and the strings have loaded too.
-    await page.waitForFunction(
-      () =>
-        window.bunraku.stage.scene.getObjectByName("floor") && window.bunraku.stage.scene.getObjectByName("strings"),
-    );
+    await waitInEngine(page, () => {
+      const { scene } = globalThis.bunraku.stage;
+      return ["floor", "strings"].every((name) => scene.getObjectByName(name) !== undefined);
+    });
   });
 
   test("the page works and shows a notice if the stage fails to load", async () => {

@@ -1,6 +1,7 @@
 /** Control of a limb by touch. */
 import { test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
+import { waitInEngine } from "./engine-probe";
 import {
   LEFT_HAND,
   pauseAtStart,
@@ -28,9 +29,10 @@ describeInBrowser("touch", { server: "open" }, ({ open }) => {
     await page.getByRole("button", { name: "Release the left hand" }).waitFor({ state: "attached" });
     for (const step of [1, 2, 3, 4]) await sendTouch("touchMove", 6 * step, -12 * step);
     // The ring follows the finger.
-    await page.waitForFunction(
+    await waitInEngine(
+      page,
       ({ limb, from }) => {
-        const { stage, hands } = window.bunraku;
+        const { stage, hands } = globalThis.bunraku;
         const at = stage.puppet && stage.toScreen(stage.puppet.handle(limb, stage.rig.group.position.clone()));
         return hands.source(limb) === "pointer" && at !== null && at.y < from.y - 20;
       },

@@ -4,6 +4,7 @@ import { resolve } from "node:path";
 import type { Page } from "playwright-core";
 import { test } from "vitest";
 import { type BrowserFixture, describeInBrowser } from "../browser/browser-suite";
+import { evaluateInEngine, waitInEngine } from "../browser/engine-probe";
 import {
   jointPosition,
   ringPosition,
@@ -82,11 +83,12 @@ async function openStage(
   if (await pause.isVisible()) await pause.click();
   const bar = await page.getByRole("slider", { name: "Seek" }).boundingBox();
   if (!bar) throw new Error("The page has no seek bar");
-  const durationS = await page.evaluate(() => window.bunraku.viewer.duration);
+  const durationS = await evaluateInEngine(page, () => globalThis.bunraku.viewer.duration);
   await page.mouse.click(bar.x + (bar.width * POSE_TIME_S) / durationS, bar.y + bar.height / 2);
   await page.mouse.move(viewport.width / 2, 4);
-  await page.waitForFunction(
-    (at) => Math.abs(window.bunraku.viewer.positionAt(performance.now()) - at) < 0.5,
+  await waitInEngine(
+    page,
+    (at) => Math.abs(globalThis.bunraku.viewer.positionAt(performance.now()) - at) < 0.5,
     POSE_TIME_S,
   );
   await waitUntilSettled(page, () => jointPosition(page, "r_wrist"), 0.002);

@@ -1,6 +1,6 @@
 /** Common parts of the cases of `make bench-page`. */
 import type { Browser, BrowserContextOptions, CDPSession, Page } from "playwright-core";
-import { launchChromium } from "../../browser/chromium";
+import { launchChromium, PAGE_TIMEOUT_MS } from "../../browser/chromium";
 
 /** Figures by name. Lists are reported as notes instead. */
 export type BenchFigures = Record<string, number>;
@@ -20,9 +20,6 @@ export interface Visit {
   page: Page;
   protocol: CDPSession;
 }
-
-/** Time limit of every wait on a page, in milliseconds. It is generous because Chromium renders in software. */
-const PAGE_TIMEOUT_MS = 120_000;
 
 /** An idle browser uses less than this share of a processor over `IDLE_WINDOW_S` seconds. */
 const MAX_IDLE_LOAD = 0.05;

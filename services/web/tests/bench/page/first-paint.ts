@@ -1,14 +1,13 @@
 /** Cases `arrival` and `line`: time to the first paint of the puppet, and size of the scripts and fonts. */
 import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
+import { evaluateInEngine } from "../../browser/engine-probe";
 import { LEFT_HAND, waitForFirstPose, waitForHold, waitForWelcome } from "../../browser/page-probe";
 import { type BenchContext, type BenchFigures, percentile, roundTo, withPage } from "./bench";
 
 declare global {
-  interface Window {
-    /** Time of the puppet's first paint in milliseconds since the start of the navigation. Set by `watchFirstPaint`. */
-    firstPaint?: number;
-  }
+  /** Time of the puppet's first paint in milliseconds since the epoch. Set by `watchFirstPaint`. */
+  var firstPaint: Promise<number>;
 }
 
 const VISIT_COUNT = 5;
@@ -42,17 +41,30 @@ export async function benchConstrainedFirstPaint(bench: BenchContext): Promise<B
 /** Return the time until a page has drawn the puppet, in seconds. */
 async function measureFirstPaint(page: Page, url: string): Promise<number> {
   await page.addInitScript(watchFirstPaint);
+  const paintInWorker = new Promise<number>((resolve) =>
+    page.on("worker", (worker) => {
+      const paint = worker.evaluate(watchFirstPaint).then(() => worker.evaluate(() => globalThis.firstPaint));
+      // A worker without a stage never reports a paint and ends with the page.
+      paint.then(resolve, () => undefined);
+    }),
+  );
   await page.goto(url, { waitUntil: "commit" });
-  await page.waitForFunction(() => window.firstPaint !== undefined);
-  return (await page.evaluate(() => window.firstPaint ?? NaN)) / 1000;
+  const paint = await Promise.race([page.evaluate(() => globalThis.firstPaint), paintInWorker]);
+  return (paint - (await page.evaluate(() => performance.timeOrigin))) / 1000;
 }
 
-/** In the page: record when the GPU has completed the first frame with the puppet. */
+/** In the page and in its workers: observe when the GPU has completed the first frame with the puppet. */
 function watchFirstPaint(): void {
   let isDrawn: (() => boolean) | null = null;
+  let isReported = false;
+  let report: (time: number) => void;
+  globalThis.firstPaint = new Promise((resolve) => (report = resolve));
   const check = () => {
-    const { stage } = window.bunraku ?? {};
-    if (isDrawn?.()) window.firstPaint ??= performance.now();
+    const { stage } = globalThis.bunraku ?? {};
+    if (!isReported && isDrawn?.()) {
+      isReported = true;
+      report(performance.timeOrigin + performance.now());
+    }
     if (!stage || isDrawn) return;
     const { renderer } = stage;
     const render = renderer.render;
@@ -68,15 +80,15 @@ function watchFirstPaint(): void {
     };
   };
   // Check before each frame too: a long frame delays the timer.
-  const request = window.requestAnimationFrame.bind(window);
-  window.requestAnimationFrame = (callback) =>
+  const request = globalThis.requestAnimationFrame.bind(globalThis);
+  globalThis.requestAnimationFrame = (callback) =>
     request((time) => {
       check();
       callback(time);
     });
   const poll = () => {
     check();
-    if (window.firstPaint === undefined) setTimeout(poll);
+    if (!isReported) setTimeout(poll);
   };
   poll();
 }
@@ -90,7 +102,12 @@ async function measureDownloads(bench: BenchContext): Promise<BenchFigures> {
     await page.keyboard.press("Digit2");
     await waitForHold(page, LEFT_HAND);
     await page.waitForLoadState("networkidle");
-    return page.evaluate(() => performance.getEntriesByType("resource").map(({ name }) => name));
+    const listUrls = () => performance.getEntriesByType("resource").map(({ name }) => name);
+    return [
+      ...(await page.evaluate(listUrls)),
+      ...(await evaluateInEngine(page, listUrls)),
+      ...page.workers().map((worker) => worker.url()),
+    ];
   });
   const sizes = { js: 0, woff2: 0 };
   for (const url of new Set(urls)) {

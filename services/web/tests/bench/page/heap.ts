@@ -1,8 +1,8 @@
-/** Composition of a page's heap, from a heap snapshot. */
-import type { CDPSession } from "playwright-core";
+/** Composition of the heap of a page's thread, from a heap snapshot. */
+import type { ThreadProtocol } from "../../browser/engine-protocol";
 
 export interface HeapUsage {
-  /** Objects, arrays, closures, strings and numbers of the page's script, in bytes. */
+  /** Objects, arrays, closures, strings and numbers of the script, in bytes. */
   objects: number;
   /** Byte code, machine code and type feedback, in bytes. V8 keeps optimising for a long time. */
   code: number;
@@ -18,7 +18,7 @@ interface Snapshot {
 const CODE_TYPES = new Set(["code", "object shape"]);
 const EXTERNAL_TYPES = new Set(["native", "synthetic", "hidden"]);
 
-export async function measureHeap(protocol: CDPSession): Promise<HeapUsage> {
+export async function measureHeap(protocol: ThreadProtocol): Promise<HeapUsage> {
   const chunks: string[] = [];
   const take = ({ chunk }: { chunk: string }) => void chunks.push(chunk);
   protocol.on("HeapProfiler.addHeapSnapshotChunk", take);

@@ -4,6 +4,7 @@ import { existsSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import type { CDPSession, Page } from "playwright-core";
+import { collectGarbage, openThreadProtocols, type ThreadProtocol } from "../../browser/engine-protocol";
 import {
   LEFT_HAND,
   ringPosition,
@@ -40,15 +41,16 @@ export async function benchMemory(bench: BenchContext): Promise<BenchFigures> {
       await waitForFirstPose(page);
       await waitForWelcome(page);
       for (let nth = 0; nth < WARM_UP_ROUNDS; nth++) await playRound(page, clip);
-      const before = await measureMemory(protocol);
+      const threads = await openThreadProtocols(page);
+      const before = await measureMemory(protocol, threads);
       const end = performance.now() + bench.minutes * 60_000;
       let rounds = 0;
       const heaps: number[] = [];
       for (; performance.now() < end; rounds++) {
         await playRound(page, clip);
-        if (rounds % NOTE_EVERY_ROUNDS === 0) heaps.push(roundTo((await usedHeapBytes(protocol)) / 1e6, 2));
+        if (rounds % NOTE_EVERY_ROUNDS === 0) heaps.push(roundTo((await usedHeapBytes(threads)) / 1e6, 2));
       }
-      const after = await measureMemory(protocol);
+      const after = await measureMemory(protocol, threads);
       bench.note(
         `memory: ${rounds} rounds in ${bench.minutes} minutes, ` +
           `heap ${roundTo(before.bytes / 1e6, 2)} to ${roundTo(after.bytes / 1e6, 2)} MB, ` +
@@ -84,18 +86,25 @@ function findClip(folder: string): string {
   return demoClip;
 }
 
-/** Return the size of the heap after a garbage collection, in bytes. */
-async function usedHeapBytes(protocol: CDPSession): Promise<number> {
-  await protocol.send("HeapProfiler.enable");
-  for (let nth = 0; nth < 3; nth++) await protocol.send("HeapProfiler.collectGarbage");
-  return (await protocol.send("Runtime.getHeapUsage")).usedSize;
+/** Return the size of the heaps of all threads after a garbage collection, in bytes. */
+async function usedHeapBytes(threads: readonly ThreadProtocol[]): Promise<number> {
+  await collectGarbage(threads);
+  let bytes = 0;
+  for (const thread of threads) bytes += (await thread.send("Runtime.getHeapUsage")).usedSize;
+  return bytes;
 }
 
 /** Measure the memory in use after a garbage collection. */
-async function measureMemory(protocol: CDPSession): Promise<MemoryUsage> {
-  const bytes = await usedHeapBytes(protocol);
+async function measureMemory(protocol: CDPSession, threads: readonly ThreadProtocol[]): Promise<MemoryUsage> {
+  const bytes = await usedHeapBytes(threads);
   const { nodes, jsEventListeners: listeners } = await protocol.send("Memory.getDOMCounters");
-  return { bytes, nodes, listeners, ...(await measureHeap(protocol)) };
+  const usage = { bytes, nodes, listeners, objects: 0, code: 0 };
+  for (const thread of threads) {
+    const { objects, code } = await measureHeap(thread);
+    usage.objects += objects;
+    usage.code += code;
+  }
+  return usage;
 }
 
 /** Use every function of the page once and restore its initial state. */

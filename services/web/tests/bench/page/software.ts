@@ -1,4 +1,5 @@
 /** Case `software`: what people see without a graphics processor, in the size of a usual window. */
+import { evaluateInEngine } from "../../browser/engine-probe";
 import { waitForFirstPose } from "../../browser/page-probe";
 import { type BenchContext, type BenchFigures, roundTo, withPage } from "./bench";
 
@@ -14,34 +15,39 @@ export function benchSoftwareRendering(bench: BenchContext): Promise<BenchFigure
     await page.goto(`${bench.url}/`);
     await waitForFirstPose(page);
     await page.waitForTimeout(SETTLING_MS);
-    const { frames, seconds, resolution, renderer } = await page.evaluate(async (duration) => {
-      const { stage } = window.bunraku;
-      const { renderer } = stage;
-      let frames = 0;
-      const draw = stage.draw.bind(stage);
-      stage.draw = (...state) => {
-        const before = renderer.info.render.frame;
-        draw(...state);
-        if (renderer.info.render.frame !== before) frames++;
-      };
-      const start = performance.now();
-      const widths: number[] = [];
-      while (performance.now() - start < duration) {
-        await new Promise(requestAnimationFrame);
-        widths.push(renderer.domElement.width / renderer.domElement.clientWidth);
-      }
-      const gl = renderer.getContext();
-      const names = gl.getExtension("WEBGL_debug_renderer_info");
-      return {
-        frames,
-        seconds: (performance.now() - start) / 1000,
-        resolution: widths.sort((a, b) => a - b)[widths.length >> 1],
-        renderer: names ? String(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "unknown",
-      };
-    }, MEASURED_MS);
+    const { frames, seconds, resolution, renderer } = await evaluateInEngine(
+      page,
+      async ({ duration, width }) => {
+        const { stage } = globalThis.bunraku;
+        const { renderer } = stage;
+        let frames = 0;
+        const draw = stage.draw.bind(stage);
+        stage.draw = (...state) => {
+          const before = renderer.info.render.frame;
+          draw(...state);
+          if (renderer.info.render.frame !== before) frames++;
+        };
+        const start = performance.now();
+        const widths: number[] = [];
+        while (performance.now() - start < duration) {
+          await new Promise(requestAnimationFrame);
+          widths.push(renderer.domElement.width / width);
+        }
+        const gl = renderer.getContext();
+        const names = gl.getExtension("WEBGL_debug_renderer_info");
+        return {
+          frames,
+          seconds: (performance.now() - start) / 1000,
+          resolution: widths.sort((a, b) => a - b)[widths.length >> 1],
+          renderer: names ? String(gl.getParameter(names.UNMASKED_RENDERER_WEBGL)) : "unknown",
+        };
+      },
+      { duration: MEASURED_MS, width: VIEWPORT.width },
+    );
     bench.note(`software: ${renderer}`);
     const similarities: number[] = [];
-    for (let picture = 0; picture < SSIM_PICTURES; picture++) similarities.push(await page.evaluate(comparePictures));
+    for (let picture = 0; picture < SSIM_PICTURES; picture++)
+      similarities.push(await evaluateInEngine(page, comparePictures, VIEWPORT));
     bench.note(`software: SSIM of ${similarities.map((value) => roundTo(value, 3)).join(", ")}`);
     return {
       software_fps: roundTo(frames / seconds),
@@ -52,13 +58,13 @@ export function benchSoftwareRendering(bench: BenchContext): Promise<BenchFigure
 }
 
 /**
- * In the page: return the structural similarity (Wang et al. 2004, Gaussian window with sigma 1.5, luma) of a frame as
- * drawn and as a picture in full quality, over the box of the first performer in CSS pixels.
+ * In the engine: return the structural similarity (Wang et al. 2004, Gaussian window with sigma 1.5, luma) of a frame as
+ * drawn and as a picture in full quality, over the box of the first performer. `width` and `height` are the size of the
+ * stage in CSS pixels.
  */
-async function comparePictures(): Promise<number> {
-  const { stage } = window.bunraku;
+async function comparePictures({ width, height }: typeof VIEWPORT): Promise<number> {
+  const { stage } = globalThis.bunraku;
   const canvas = stage.renderer.domElement;
-  const [width, height] = [canvas.clientWidth, canvas.clientHeight];
   // The picture is drawn in the task that drew the frame, so that both show the same moment.
   const { drawn, full } = await new Promise<{ drawn: Promise<ImageBitmap>; full: Promise<Blob> }>((resolve) => {
     const { draw } = stage;
