@@ -85,7 +85,11 @@ export class EngineConnection {
       worker.terminate();
       return null;
     }
-    worker.onerror = null;
+    // Errors of the worker are errors of the page.
+    worker.onerror = (event) => {
+      event.preventDefault();
+      reportError(new Error(`Error in the engine: ${event.message} (${event.filename}:${event.lineno})`));
+    };
     worker.onmessage = ({ data }: MessageEvent<EngineEvent>) => this.#onEvent(data);
     const canvas = this.canvas.transferControlToOffscreen();
     worker.postMessage({ type: "start", canvas, options: this.options } satisfies EngineStart, [canvas]);

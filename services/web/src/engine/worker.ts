@@ -35,6 +35,12 @@ self.addEventListener("message", ({ data }: MessageEvent<EngineStart | EngineCom
   else void engine?.then((started) => started.handle(data));
 });
 
+// Only errors reach the page.
+self.addEventListener("unhandledrejection", (event) => {
+  event.preventDefault();
+  reportError(event.reason);
+});
+
 self.postMessage({ type: "hello", isSupported: hasGraphics() } satisfies EngineHello);
 
 function hasGraphics(): boolean {

@@ -64,6 +64,15 @@ test("a worker gets the canvas, then what was sent before it had started, in ord
   expect(events).toEqual([{ type: "ready" }]);
 });
 
+test("errors of a running worker are errors of the page", async () => {
+  const reported: unknown[] = [];
+  vi.stubGlobal("reportError", (error: unknown) => reported.push(error));
+  await connection.start("worker");
+  const error = Object.assign(new Event("error"), { message: "no limb 9", filename: "engine.js", lineno: 3 });
+  FakeWorker.started[0].onerror?.(error);
+  expect(String(reported[0])).toContain("no limb 9 (engine.js:3)");
+});
+
 test("responses reach their requests", async () => {
   await connection.start("worker");
   const [worker] = FakeWorker.started;

@@ -120,7 +120,7 @@ describeInBrowser("sound", { server: "open", browser: FLAGS, fullFrameRate: true
     await waitForSound(page, false);
     expect(await button.getAttribute("aria-pressed")).toBe("false");
     // Without sound the stage follows the viewer's clock.
-    expect(await evaluateInEngine(page, () => globalThis.bunraku.viewer.leader?.(performance.now()))).toBeNull();
+    await waitInEngine(page, () => !globalThis.bunraku.viewer.leader?.(performance.now()));
     await page.keyboard.press("KeyM");
     await waitForSound(page, true);
     expect(await button.getAttribute("aria-pressed")).toBe("true");

@@ -18,7 +18,7 @@ describeInBrowser("startup", { server: "open" }, ({ open }) => {
     const page = await open("", {
       before: async (page) => {
         page.on("request", (request) => void requests.push(new URL(request.url()).pathname));
-        await page.route("**/stage-chunk-*.js", async (route) => {
+        await page.route("**/*stage-chunk-*.js", async (route) => {
           initialRequests ??= requestsUntilUsable(page);
           await initialRequests.catch(() => undefined);
           await route.continue();
@@ -40,7 +40,7 @@ describeInBrowser("startup", { server: "open" }, ({ open }) => {
   });
 
   test("the page works and shows a notice if the stage fails to load", async () => {
-    const page = await open("", { before: (page) => page.route("**/stage-chunk-*.js", (route) => route.abort()) });
+    const page = await open("", { before: (page) => page.route("**/*stage-chunk-*.js", (route) => route.abort()) });
     await page.getByText("The renderer could not be loaded").waitFor();
     expect(await page.getByRole("button", { name: "Library" }).isVisible()).toBe(true);
     await page.locator(".people-count").waitFor();
