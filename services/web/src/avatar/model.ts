@@ -52,12 +52,13 @@ export class AvatarModel {
   static async parse(bytes: ArrayBuffer, fallbackName: string): Promise<AvatarModel> {
     const { vrm, name, bones } = parseAvatarFile(bytes);
     const loader = new GLTFLoader();
-    loader.register((parser) => {
-      // Textures as image elements: the page's content security policy allows these from memory, but allows fetches
-      // from its own server alone.
-      parser.textureLoader = new TextureLoader(parser.options.manager);
-      return { name: "textures as image elements" };
-    });
+    // Textures as image elements where there are any: an embedding page's content security policy may allow fetches from
+    // servers alone. Workers fetch their textures from memory, which our own policy allows.
+    if (typeof Image !== "undefined")
+      loader.register((parser) => {
+        parser.textureLoader = new TextureLoader(parser.options.manager);
+        return { name: "textures as image elements" };
+      });
     if (vrm) loader.register((parser) => new VRMLoaderPlugin(parser, { autoUpdateHumanBones: false }));
     try {
       const gltf = await loader.parseAsync(bytes, "");

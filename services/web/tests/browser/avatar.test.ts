@@ -69,7 +69,7 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     await waitForFirstPose(page);
     // The toast appears once the file is stored.
     await waitForToast(page, "Boxes dances here", () => drop(page, "boxes.vrm", { vrm: 1, tail: true, dressed: true }));
-    expect(await textureWidths(page)).toEqual([2]);
+    await expect.poll(() => textureWidths(page)).toEqual([2]);
     await page.reload();
     // Keys work only once the stage has loaded.
     await waitForFirstPose(page);
@@ -80,7 +80,7 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     await page.getByRole("radio", { name: "The puppet" }).check();
     await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") !== undefined);
     await waitForToast(page, "Old boxes dances here", () => drop(page, "old.vrm", { vrm: 0, dressed: true }));
-    expect(await textureWidths(page)).toEqual([2]);
+    await expect.poll(() => textureWidths(page)).toEqual([2]);
     expect(await limbAngleError(page)).toBeLessThan(1);
     await page.getByRole("button", { name: "Remove the avatar Old boxes" }).click();
     await page.getByRole("radio", { name: "The puppet" }).waitFor({ state: "hidden" });

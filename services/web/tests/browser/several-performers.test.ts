@@ -82,7 +82,9 @@ describeInBrowser("several performers", { server: "open" }, (fixture) => {
       },
       before[1],
     );
-    expect((await leftWrists(mateo))[0]).toEqual(before[0]);
+    // Blocks of a higher level may move it by millimetres.
+    const moved = (await leftWrists(mateo))[0].map((coordinate, axis) => coordinate - before[0][axis]);
+    expect(Math.hypot(...moved)).toBeLessThan(0.01);
     await page.mouse.up();
     await waitForRelease(page, SECOND_PERFORMER + LEFT_HAND);
 
