@@ -20,11 +20,14 @@ const FRAMING_VIEWS: Readonly<Record<Framing, readonly [visible: number, look: n
   alone: [3.1, 1.005],
 };
 /**
- * Height of the transport at the bottom, in pixels, and its share of the window height that the desktop framing was
- * designed for.
+ * Height of the controls at the bottom, in pixels, and the height of the window that the framing was designed for. On a
+ * portrait phone they are the transport and the dock.
  */
-const TRANSPORT_HEIGHT_PX: Partial<Record<Framing, number>> = { desktop: 110, sideways: 76 };
-const REFERENCE_TRANSPORT_SHARE = 110 / 900;
+const BOTTOM_CONTROLS_PX: Partial<Record<Framing, readonly [controls: number, window: number]>> = {
+  desktop: [110, 900],
+  sideways: [76, 622],
+  phone: [214, 844],
+};
 /**
  * Framing above a sheet: height of the header on a phone in pixels; height of the standard figure with headroom and
  * without, in metres; share of the picture between feet and sheet; limit of the visible height.
@@ -40,10 +43,14 @@ const FAR_PLANE_M = 40;
 /** Half the width that a standard figure takes among several performers, in metres. */
 const PERFORMER_HALF_WIDTH_M = 0.9;
 /**
- * Half the width that a narrow picture shows around the selected performer, in metres for the standard figure: the
- * performer, one neighbour and part of the next.
+ * Share of the height of an upright picture that a standing figure takes at least: where all performers would be
+ * smaller, the picture shows the selected one and what fits beside it.
  */
-const NARROW_HALF_WIDTH_M = 2.1;
+const MIN_PERFORMER_SHARE = 0.3;
+/** The selected performer is kept this close to the centre of such a picture, in metres for the standard figure. */
+const MAX_SELECTED_OFFSET_M = 0.45;
+/** Lateral movement of the camera along a row of performers per radian of a drag, as a share of the visible width. */
+const PAN_SHARE_PER_RAD = 0.5;
 /** Minimum share of the picture's width left to the performers, whatever covers the sides. */
 const MIN_FREE_SHARE = 0.4;
 /** A single performer moves out of the centre only if a side covers more than this share of the width. */
@@ -73,11 +80,12 @@ export class AudienceCamera {
   #maxSideOffset = 0;
   #maxDepth = 0;
   /**
-   * Lateral position of the selected performer in a narrow picture, null if all are framed; then the target and the
-   * current lateral offset of the camera.
+   * Index and lateral position of the selected performer, null if none is; then the target and the current lateral
+   * offset of the camera, and whether the user dragged it away from the selected performer.
    */
+  #selected: number | null = null;
   #selectedX: number | null = null;
-  #isNarrow = false;
+  #isPanned = false;
   #targetSideOffset = 0;
   #sideOffset = 0;
   /**
@@ -86,6 +94,7 @@ export class AudienceCamera {
    */
   #freeShare = 1;
   #freeCentre = 0;
+  #uncoveredSpan: readonly [left: number, right: number] = [0, 1];
   #soloShift = 0;
   #viewShift = 0;
   #appliedShift = 0;
@@ -117,9 +126,15 @@ export class AudienceCamera {
   set coveredSides({ left, right, width }: { left: number; right: number; width: number }) {
     const freeShare = 1 - (left + right) / width;
     const isTooNarrow = freeShare < MIN_FREE_SHARE;
+    this.#uncoveredSpan = isTooNarrow ? [0, 1] : [left / width, 1 - right / width];
     this.#freeShare = isTooNarrow ? 1 : freeShare;
     this.#freeCentre = isTooNarrow ? 0 : (left - right) / 2 / width;
     this.#soloShift = Math.max(left, right) / width > MAX_COVERED_SHARE ? this.#freeCentre : 0;
+  }
+
+  /** Ends of the part of the picture that the page leaves uncovered, as shares of its width; all if there is little. */
+  get uncoveredSpan(): readonly [left: number, right: number] {
+    return this.#uncoveredSpan;
   }
 
   /**
@@ -128,8 +143,8 @@ export class AudienceCamera {
    */
   setFraming(framing: Framing, height: number, sheetHeight = 0): void {
     const [visible, look] = FRAMING_VIEWS[framing];
-    const coveredShare = Math.max(0, (TRANSPORT_HEIGHT_PX[framing] ?? 0) / height - REFERENCE_TRANSPORT_SHARE);
-    this.#isNarrow = framing === "phone" || framing === "sheet";
+    const [controls, window] = BOTTOM_CONTROLS_PX[framing] ?? [0, 1];
+    const coveredShare = Math.max(0, controls / height - controls / window);
     this.#targetFraming =
       framing === "sheet" && sheetHeight > 0
         ? framingAboveSheet(visible, sheetHeight / height, HEADER_HEIGHT_PX / height)
@@ -177,12 +192,18 @@ export class AudienceCamera {
     this.#blendShare = 0;
     this.#maxSideOffset = this.#maxDepth = this.#targetSideOffset = this.#sideOffset = 0;
     this.#viewShift = this.#soloShift;
+    this.#isPanned = false;
     this.#isFirstFrame = true;
   }
 
   /** Largest lateral extent of several performers, in metres; 0 for a single one. */
   get maxSideOffset(): number {
     return this.#maxSideOffset;
+  }
+
+  /** Lateral offset of the audience view, in metres; 0 while the motion's camera is followed. */
+  get sideOffset(): number {
+    return this.#sideOffset * (1 - MathUtils.smootherstep(this.#blendShare, 0, 1));
   }
 
   /** True if some performers are outside the picture, which then shows the selected one. */
@@ -192,17 +213,20 @@ export class AudienceCamera {
 
   /** Lateral extent that is framed, in metres. */
   get #visibleSideOffset(): number {
-    return this.#isNarrow && this.#selectedX !== null
-      ? Math.min(this.#maxSideOffset, NARROW_HALF_WIDTH_M * this.scale)
-      : this.#maxSideOffset;
+    const { aspect } = this.camera;
+    if (aspect >= 1) return this.#maxSideOffset;
+    const visibleHeight = Math.max(this.#targetFraming[0], STANDING_HEIGHT_M / MIN_PERFORMER_SHARE) * this.scale;
+    return Math.min(this.#maxSideOffset, (visibleHeight / 2) * aspect * this.#freeShare);
   }
 
   /**
    * Set the positions of the performers, in metres in the frame of the camera's parent. A single performer fills the
-   * picture and several share it, except in a narrow window, where they would be too small: it shows the selected
-   * performer and its neighbours, and moves sideways only to keep the selected one in view.
+   * picture and several share it, except in an upright one, where they would be too small: it shows the selected
+   * performer with part of its neighbours, or the middle of the row, and a drag moves along the row.
    */
   placePerformers(performers: readonly { x: number; z: number }[], selected: number | null = null): void {
+    if (selected !== this.#selected) this.#isPanned = false;
+    this.#selected = selected;
     this.#selectedX = (selected === null ? null : performers[selected]?.x) ?? null;
     if (performers.length < 2) return;
     this.#maxSideOffset = Math.max(
@@ -214,11 +238,17 @@ export class AudienceCamera {
   }
 
   /**
-   * Turn the audience view by a drag, in radians. It springs back 4 s after the last drag. Leave the motion's camera.
+   * Turn the audience view by a drag, in radians. It springs back 4 s after the last drag. If performers are outside
+   * the picture, a sideways drag moves along their row instead. Leave the motion's camera.
    */
   orbit(yaw: number, pitch: number): void {
     this.#isDragged ||= this.followsMotionCamera;
-    this.#yaw = Math.min(MAX_YAW_RAD, Math.max(-MAX_YAW_RAD, this.#yaw + yaw));
+    if (this.hidesPerformers) {
+      this.#isPanned = true;
+      this.#targetSideOffset += yaw * PAN_SHARE_PER_RAD * 2 * this.#visibleSideOffset;
+      this.#limitSideOffset();
+      this.#sideOffset = this.#targetSideOffset;
+    } else this.#yaw = MathUtils.clamp(this.#yaw + yaw, -MAX_YAW_RAD, MAX_YAW_RAD);
     this.#pitch = Math.min(MAX_PITCH_RAD, Math.max(MIN_PITCH_RAD, this.#pitch + pitch));
     this.#sinceOrbitS = 0;
   }
@@ -228,7 +258,9 @@ export class AudienceCamera {
    * `motionCamera` the seven numbers of the motion's camera, null if there is none.
    */
   update(seconds: number, reach: number, motionCamera: ArrayLike<number> | null = null): void {
-    this.#updateAudienceView(seconds, this.isAudienceView ? reach : 0);
+    // Hands outside the picture need no space.
+    const isReachVisible = this.isAudienceView && !(this.hidesPerformers && this.#selectedX === null);
+    this.#updateAudienceView(seconds, isReachVisible ? reach : 0);
     this.#hasMotionCamera = motionCamera !== null;
     if (motionCamera) viewFromNumbers(motionCamera, this.#motionView);
     const goal = this.followsMotionCamera ? 1 : 0;
@@ -238,6 +270,12 @@ export class AudienceCamera {
     this.#blendShare = Math.min(Math.max(goal, this.#blendShare - step), this.#blendShare + step);
     interpolateViews(this.#audienceView, this.#motionView, MathUtils.smootherstep(this.#blendShare, 0, 1), this.view);
     this.#applyView();
+  }
+
+  /** Keep the camera within the extent of the performers. */
+  #limitSideOffset(): void {
+    const maxOffset = this.#maxSideOffset - this.#visibleSideOffset;
+    this.#targetSideOffset = MathUtils.clamp(this.#targetSideOffset, -maxOffset, maxOffset);
   }
 
   /** Update the audience view, in the world frame. */
@@ -254,17 +292,15 @@ export class AudienceCamera {
     this.distanceScale += (distanceGoal - this.distanceScale) * (this.#isFirstFrame ? 1 : share);
     const shift = this.#maxSideOffset > 0 ? this.#freeCentre : this.#soloShift;
     this.#viewShift += (shift - this.#viewShift) * (this.#isFirstFrame && this.#maxSideOffset > 0 ? 1 : share);
-    // Keep the selected performer fully in view, and stay within the performers' extent.
-    const [selectedX, halfWindow, maxOffset] = [
-      this.#selectedX ?? 0,
-      visibleOffset - PERFORMER_HALF_WIDTH_M * this.scale,
-      this.#maxSideOffset - visibleOffset,
-    ];
-    this.#targetSideOffset = MathUtils.clamp(
-      MathUtils.clamp(this.#targetSideOffset, selectedX - halfWindow, selectedX + halfWindow),
-      -maxOffset,
-      maxOffset,
-    );
+    if (this.#selectedX !== null && !this.#isPanned) {
+      const tolerance = MAX_SELECTED_OFFSET_M * this.scale;
+      this.#targetSideOffset = MathUtils.clamp(
+        this.#targetSideOffset,
+        this.#selectedX - tolerance,
+        this.#selectedX + tolerance,
+      );
+    }
+    this.#limitSideOffset();
     this.#sideOffset += (this.#targetSideOffset - this.#sideOffset) * (this.#isFirstFrame ? 1 : share);
     this.#isFirstFrame &&= this.#maxSideOffset === 0;
     this.#visibleHeight += (visible - this.#visibleHeight) * share;

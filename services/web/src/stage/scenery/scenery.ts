@@ -29,12 +29,14 @@ export class Scenery {
   readonly #backdrop = createBackdrop(this.#backdropUniforms, this.#vignette, this.#baked);
   readonly #bakedBackdrop = new BakedBackdrop(this.#backdropUniforms, this.#baked);
   readonly #floor: Floor;
+  /** Distance that the boards have travelled relative to the scenery, in metres of its own scale. */
+  readonly #boardOffset = new Vector2();
 
   /** `floorOffset` is the distance that the stage has travelled, which the boards show. */
-  constructor(floorOffset = new Vector2()) {
+  constructor(private readonly floorOffset = new Vector2()) {
     this.group.name = "scenery";
     const surroundings = { backdrop: this.#backdropUniforms, vignette: this.#vignette, baked: this.#baked };
-    this.#floor = createFloor(surroundings, this.group, floorOffset);
+    this.#floor = createFloor(surroundings, this.group, this.#boardOffset);
     this.group.add(this.#backdrop.mesh, this.#floor.mesh);
   }
 
@@ -71,9 +73,14 @@ export class Scenery {
     for (const part of [this.#backdrop, this.#bakedBackdrop, this.#floor]) part.dispose();
   }
 
-  /** Advance by `seconds`. */
-  update(view: CameraView, isAudienceView: boolean, seconds: number): void {
-    const { rotation, parent } = this.group;
+  /**
+   * Advance by `seconds`. The backdrop is behind the centre of an audience view moved by `sideOffset` metres, as if it
+   * were far away; the boards stay where they are.
+   */
+  update(view: CameraView, isAudienceView: boolean, seconds: number, sideOffset = 0): void {
+    const { position, scale, rotation, parent } = this.group;
+    position.x = sideOffset;
+    this.#boardOffset.copy(this.floorOffset).setX(this.floorOffset.x + sideOffset / scale.x);
     place.copy(view.position);
     gaze.copy(view.gaze);
     if (parent) for (const at of [place, gaze]) parent.worldToLocal(at);

@@ -25,6 +25,12 @@ describe("framing", () => {
     );
   });
 
+  test.each([640, 740, 844])("shows the feet above the dock of a phone, %d pixels high", (height) => {
+    const audience = createCamera("phone", 360, height);
+    expect(pixelsAbove(audience, 0, height)).toBeGreaterThan(214);
+    expect(pixelsAbove(audience, 1.75, height)).toBeLessThan(height - 80);
+  });
+
   test("makes the puppet smaller on a phone and lifts it above a sheet", () => {
     const size = (framing: Framing) =>
       pixelsAbove(createCamera(framing, 400, 800), 1.75, 800) - pixelsAbove(createCamera(framing, 400, 800), 0, 800);

@@ -12,7 +12,7 @@ describe("several performers", () => {
 
   test.each([
     [1440, 900, "desktop"],
-    [390, 844, "phone"],
+    [844, 390, "sideways"],
     [760, 480, "alone"],
   ] as const)("are all in the picture of %d by %d", (width, height, framing) => {
     const audience = createCamera(framing, width, height);
@@ -26,7 +26,7 @@ describe("several performers", () => {
     );
   });
 
-  describe("in a narrow window with one selected", () => {
+  describe("in an upright picture", () => {
     const FOUR = [-2.7, -0.9, 0.9, 2.7].map((x) => ({ x, z: 0 }));
     const withSelection = (one: number | null, audience = createCamera("phone", 390, 844)) => {
       audience.placePerformers(FOUR, one);
@@ -35,34 +35,65 @@ describe("several performers", () => {
     };
     const inView = (audience: AudienceCamera) =>
       FOUR.map(({ x }) => Math.max(Math.abs(side(audience, x - 0.85)), Math.abs(side(audience, x + 0.85))) <= 1);
+    const heightOf = (audience: AudienceCamera, height: number) =>
+      pixelsAbove(audience, 1.75, height) - pixelsAbove(audience, 0, height);
 
-    test("are shown in pairs, and closer", () => {
-      expect(inView(withSelection(0))).toEqual([true, true, false, false]);
-      expect(inView(withSelection(3))).toEqual([false, false, true, true]);
-      expect(inView(withSelection(null))).toEqual([true, true, true, true]);
-      expect(withSelection(0).distanceScale).toBeLessThan(0.65 * withSelection(null).distanceScale);
-      expect([withSelection(0).hidesPerformers, withSelection(null).hidesPerformers]).toEqual([true, false]);
+    test.each([
+      [360, 640, "phone", [0, 0]],
+      [390, 844, "phone", [0, 0]],
+      [768, 1024, "desktop", [96, 96]],
+      [600, 800, "alone", [0, 0]],
+    ] as const)("take 28%% of its height, %d by %d", (width, height, framing, [left, right]) => {
+      for (const selected of [0, 1, null]) {
+        const audience = createCamera(framing, width, height);
+        audience.coveredSides = { left, right, width };
+        expect(heightOf(withSelection(selected, audience), height) / height).toBeGreaterThan(0.28);
+      }
     });
 
-    test("are panned to only if the selected one is not fully in view, smoothly", () => {
+    test("are shown with the selected one, or from the middle of the row", () => {
+      expect(inView(withSelection(0))).toEqual([true, false, false, false]);
+      expect(inView(withSelection(2))).toEqual([false, false, true, false]);
+      expect(inView(withSelection(3))).toEqual([false, false, false, true]);
+      expect(withSelection(null).camera.position.x).toBe(0);
+      expect([withSelection(0).hidesPerformers, withSelection(null).hidesPerformers]).toEqual([true, true]);
+    });
+
+    test("are panned to if another one is selected, smoothly", () => {
       const audience = withSelection(0);
       const { x } = audience.camera.position;
-      expect(withSelection(1, audience).camera.position.x).toBeCloseTo(x, 9);
       audience.reducedMotion = false;
       audience.placePerformers(FOUR, 2);
       audience.update(1 / 60, 0);
       expect(audience.camera.position.x).toBeGreaterThan(x);
       expect(audience.camera.position.x).toBeLessThan(x + 0.4);
       run(audience, 3);
-      expect(inView(audience)).toEqual([false, true, true, false]);
+      expect(inView(audience)).toEqual([false, false, true, false]);
+      expect(audience.sideOffset).toBeCloseTo(audience.camera.position.x, 9);
     });
 
-    test("are all shown in a wide picture, and two in every picture", () => {
+    test("can be dragged along the row, until another one is selected", () => {
+      for (const selected of [null, 0]) {
+        const audience = withSelection(selected);
+        audience.orbit(9, 0);
+        withSelection(selected, audience);
+        expect(inView(audience)).toEqual([false, false, false, true]);
+        expect(new Vector3(audience.sideOffset, 1, 0).project(audience.camera).x).toBeCloseTo(0, 9);
+        audience.orbit(-9, 0);
+        expect(inView(withSelection(selected, audience))).toEqual([true, false, false, false]);
+        expect(inView(withSelection(2, audience))).toEqual([false, false, true, false]);
+      }
+    });
+
+    test("do not move the camera back for hands outside it", () => {
+      const audience = withSelection(null);
+      const { z } = audience.camera.position;
+      audience.update(1, 3);
+      expect(audience.camera.position.z).toBeCloseTo(z, 9);
+    });
+
+    test("are all shown in a wide picture", () => {
       expect(inView(withSelection(0, createCamera("desktop", 1440, 900)))).toEqual([true, true, true, true]);
-      const two = createCamera("phone", 390, 844);
-      two.placePerformers(FOUR.slice(1, 3), 0);
-      two.update(0, 0);
-      expect([two.hidesPerformers, two.camera.position.x]).toEqual([false, 0]);
     });
   });
 

@@ -63,4 +63,12 @@ describe("the scenery", () => {
     scenery.update(viewFrom(1.5, 1.2), false, 1 / 60);
     expect(scenery.group.rotation.y).toBeCloseTo(1.5 - MAX_SIDE_ANGLE_RAD, 9);
   });
+
+  test("moves sideways with the audience view", () => {
+    const scenery = new Scenery();
+    scenery.update(viewFrom(0), true, 1 / 60, 1.5);
+    expect(scenery.group.position.x).toBe(1.5);
+    scenery.update(viewFrom(0), true, 1 / 60);
+    expect(scenery.group.position.x).toBe(0);
+  });
 });
