@@ -224,7 +224,7 @@ export class Stage {
       Math.max(distanceScale, audience.maxSideOffset / LIT_HALF_WIDTH_M),
     );
     this.scene.environmentIntensity = this.#look.environment * this.#lights.ambientLevel;
-    this.#scenery.update(audience.view, audience.isAudienceView, seconds);
+    this.#scenery.update(audience.view, audience.isAudienceView, seconds, audience.sideOffset);
     if (hasPose && clock !== null) this.cameraRecorder.add(clock, audience.view, audience.isCustomView);
     if (hasPose) this.#updateStrings(states, seconds);
     this.scene.updateMatrixWorld();
@@ -301,13 +301,14 @@ export class Stage {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
   }
 
-  /** Return the world position of the hand nearer to the camera. */
+  /** Return the world position of the first performer's free hand nearer to the camera; null if none is free. */
   nearerHand(): Vector3 | null {
     const { puppet } = this;
     if (!puppet) return null;
     const eye = this.audience.camera.getWorldPosition(new Vector3());
-    const [left, right] = [0, 1].map((limb) => puppet.handle(limb, new Vector3()));
-    return left.distanceToSquared(eye) < right.distanceToSquared(eye) ? left : right;
+    const hands = [0, 1].filter((limb) => !this.strings.barPosition(limb));
+    const positions = hands.map((limb) => puppet.handle(limb, new Vector3()));
+    return positions.sort((a, b) => a.distanceToSquared(eye) - b.distanceToSquared(eye))[0] ?? null;
   }
 
   /** Box around all performers and control bars in the picture, in CSS pixels. */
@@ -344,6 +345,7 @@ export class Stage {
       ceiling: this.#ceilingHeight(),
       right: this.right(),
       distanceScale: this.audience.distanceScale,
+      sides: this.#uncoveredSides(),
     };
     const performers = this.performers.map((performer) => (performer.group.visible ? performer : null));
     this.strings.update(performers, states, this.#look, seconds, view);
@@ -392,6 +394,16 @@ export class Stage {
         [0, 1].map((limb) => Math.abs(performer.handle(limb, at).project(this.audience.camera).x)),
       ),
     );
+  }
+
+  /** Positions along the camera's right between which the page leaves the picture uncovered, in metres. */
+  #uncoveredSides(): readonly [left: number, right: number] {
+    const centre = this.rig.group.localToWorld(new Vector3(0, 1, 0));
+    const { width, height } = this.#projection;
+    const [left, right] = this.audience.uncoveredSpan.map((share) =>
+      this.fromScreen(share * width, height / 2, centre)?.dot(this.right()),
+    );
+    return [left ?? -Infinity, right ?? Infinity];
   }
 
   #ceilingHeight(): number {

@@ -25,3 +25,20 @@ export function separate(positions: readonly number[], minDistance: number): num
   order.forEach((index, rank) => (separated[index] = means[rank] + rank * minDistance));
   return separated;
 }
+
+/**
+ * Return positions that are `minDistance` apart, moved between `left` and `right` with the same distances. If there is
+ * too little space, they extend beyond `right`.
+ */
+export function limit(
+  positions: readonly number[],
+  minDistance: number,
+  [left, right]: readonly [left: number, right: number],
+): number[] {
+  const order = positions.map((_, index) => index).sort((a, b) => positions[a] - positions[b]);
+  const limited = [...positions];
+  const last = order.length - 1;
+  order.forEach((index, rank) => (limited[index] = Math.min(limited[index], right - (last - rank) * minDistance)));
+  order.forEach((index, rank) => (limited[index] = Math.max(limited[index], left + rank * minDistance)));
+  return limited;
+}

@@ -6,7 +6,7 @@ import type { Performer } from "../puppet/performer";
 import type { Look } from "../scenery/look";
 import { type ControlBar, ControlBars, HOOK_OFFSET_M } from "./control-bar";
 import { HandleRings } from "./handle-ring";
-import { separate } from "./separation";
+import { limit, separate } from "./separation";
 import { Threads } from "./thread";
 
 export interface StringState {
@@ -27,6 +27,11 @@ export interface StringsView {
   ceiling: number;
   /** The camera's right in the world frame. */
   right: Vector3;
+  /**
+   * Positions along `right` between which the page leaves the picture uncovered, in metres: bars of handles between them
+   * stay there. Unlimited by default.
+   */
+  sides?: readonly [left: number, right: number];
   /** Distance of the camera as a multiple of what one performer needs. */
   distanceScale: number;
 }
@@ -46,6 +51,8 @@ const MIN_BAR_HEIGHT_M = [2.14, 1.98];
  */
 const SAME_HEIGHT_M = 0.2;
 const MIN_BAR_DISTANCE_M = 0.36;
+/** Half the width of a bar with a margin, in metres for the standard figure. */
+const BAR_HALF_WIDTH_M = 0.2;
 const MAX_LEAN_RAD = (12 * Math.PI) / 180;
 
 interface StringAnimation {
@@ -123,11 +130,7 @@ export class Strings {
       ),
     );
     const visible = strings.filter((string) => string !== null);
-    separateBars(
-      visible.flatMap(({ barTarget: goal }) => goal ?? []),
-      view.right,
-      Math.max(...visible.map(({ size }) => size)),
-    );
+    separateBars(visible, view);
     const bars = strings.map((string, limb) =>
       string ? this.#drawString(limb, string, look, seconds, view.right) : this.#hideString(limb),
     );
@@ -272,18 +275,30 @@ function barTarget(
   return goal;
 }
 
-/** Move bars of similar height apart along the camera's `right`. */
-function separateBars(goals: readonly Vector3[], right: Vector3, scale: number): void {
-  const level: Vector3[][] = [];
-  for (const goal of [...goals].sort((a, b) => a.y - b.y)) {
-    const last = level.at(-1);
-    if (last && goal.y - last[last.length - 1].y < SAME_HEIGHT_M * scale) last.push(goal);
-    else level.push([goal]);
+/** Move bars of similar height apart along the camera's right, between the sides of the view. */
+function separateBars(strings: readonly StringLayout[], { right, sides = [-Infinity, Infinity] }: StringsView): void {
+  const scale = Math.max(...strings.map(({ size }) => size));
+  const bars = strings
+    .flatMap(({ barTarget: goal, handle }) => (goal ? { goal, handle: handle.dot(right) } : []))
+    .sort((a, b) => a.goal.y - b.goal.y);
+  const levels: (typeof bars)[] = [];
+  for (const bar of bars) {
+    const last = levels.at(-1);
+    if (last && bar.goal.y - last[last.length - 1].goal.y < SAME_HEIGHT_M * scale) last.push(bar);
+    else levels.push([bar]);
   }
-  for (const bars of level) {
-    const positions = bars.map((bar) => bar.dot(right));
-    separate(positions, MIN_BAR_DISTANCE_M * scale).forEach((position, index) =>
-      bars[index].addScaledVector(right, position - positions[index]),
+  const [left, end] = sides;
+  for (const level of levels) {
+    const positions = level.map(({ goal }) => goal.dot(right));
+    const separated = separate(positions, MIN_BAR_DISTANCE_M * scale);
+    // A handle that is outside the picture or covered keeps its bar above it.
+    const inside = level.flatMap(({ handle }, index) => (handle > left && handle < end ? index : []));
+    const limited = limit(
+      inside.map((index) => separated[index]),
+      MIN_BAR_DISTANCE_M * scale,
+      [left + BAR_HALF_WIDTH_M * scale, end - BAR_HALF_WIDTH_M * scale],
     );
+    inside.forEach((index, nth) => (separated[index] = limited[nth]));
+    level.forEach(({ goal }, index) => goal.addScaledVector(right, separated[index] - positions[index]));
   }
 }

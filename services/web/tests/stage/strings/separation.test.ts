@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { separate } from "../../../src/stage/strings/separation";
+import { limit, separate } from "../../../src/stage/strings/separation";
 
 test("separate positions do not move", () => {
   expect(separate([3, 1, 2], 0.5)).toEqual([3, 1, 2]);
@@ -26,4 +26,11 @@ test("all positions are separated, in order, around the same mean", () => {
       expect(sum(separated)).toBeCloseTo(sum(given), 9);
     }),
   );
+});
+
+test("limited positions move inside with their distances, in their order", () => {
+  expect(limit([0, 1, 5], 1, [-2, 6])).toEqual([0, 1, 5]);
+  expect(limit([5, 0, 6], 1, [-2, 4])).toEqual([3, 0, 4]);
+  expect(limit([-4, -3, 0], 1, [-2, 4])).toEqual([-2, -1, 0]);
+  expect(limit([0, 1, 2], 1, [0, 1])).toEqual([0, 1, 2]);
 });

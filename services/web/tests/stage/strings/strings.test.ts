@@ -7,12 +7,17 @@ const FREE: StringState = { puppeteer: null, isHighlighted: false, pullTarget: n
 const RIGHT = new Vector3(1, 0, 0);
 
 /** Return the bars at rest for limbs with handles at these positions, held where a puppeteer is given. */
-function barsFor(handles: readonly [number, number][], puppeteers: readonly (number | null)[]): (Vector3 | null)[] {
+function barsFor(
+  handles: readonly [number, number][],
+  puppeteers: readonly (number | null)[],
+  sides?: readonly [number, number],
+): (Vector3 | null)[] {
   const strings = new Strings();
   strings.reducedMotion = true;
   const puppet = { scale: 1, handle: (limb: number, out: Vector3) => out.set(...handles[limb], 0) };
   const states = puppeteers.map((puppeteer) => ({ ...FREE, puppeteer }));
-  strings.update([puppet], states, LOOKS.night, 0.016, { ground: 0, ceiling: 2.6, right: RIGHT, distanceScale: 1 });
+  const view = { ground: 0, ceiling: 2.6, right: RIGHT, distanceScale: 1, ...(sides && { sides }) };
+  strings.update([puppet], states, LOOKS.night, 0.016, view);
   return [0, 1, 2, 3].map((limb) => strings.barPosition(limb)?.clone() ?? null);
 }
 
@@ -45,6 +50,19 @@ describe("bars", () => {
     const places = bars.map(({ x }) => x).sort((a, b) => a - b);
     places.slice(1).forEach((x, nth) => expect(x - places[nth]).toBeGreaterThan(0.359));
     expect(places.reduce((sum, x) => sum + x, 0)).toBeCloseTo(0, 9);
+  });
+
+  test("hang in the uncovered part of the picture, unless their handles are covered", () => {
+    const handles: [number, number][] = [
+      [0.6, 1.2],
+      [-0.6, 1.2],
+      [0.1, 0.5],
+      [-0.1, 0.5],
+    ];
+    const [left, right] = barsFor(handles, [0, 1, null, null], [-0.62, 0.65]);
+    expect(left?.x).toBeCloseTo(0.45, 9);
+    expect(right?.x).toBeCloseTo(-0.42, 9);
+    expect(barsFor(handles, [0, null, null, null], [-0.5, 0.5])[0]?.x).toBeCloseTo(0.68, 9);
   });
 
   test("at different heights stay over their limbs", () => {
