@@ -94,6 +94,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     (name, open) => {
       transport.setExpanded(name, open);
       strings.dock.hidden = panels.isOpen("strings") || panels.isSheetOpen;
+      occupied.invalidate();
       actions.reframe();
     },
     actions.reframe,
@@ -102,6 +103,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     ...header.parts,
     ...transport.parts,
     strings.dock,
+    ...strings.dock.querySelectorAll("span"),
     ...elements.values(),
     messageArea.element,
   ]);

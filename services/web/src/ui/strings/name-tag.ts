@@ -6,7 +6,7 @@ import { MAX_LIMBS, performerOfLimb } from "../../wire/limbs";
 import { element, setAttribute, setText } from "../dom";
 import { initialOf } from "../format";
 import { type LimbState, limbName } from "../limb-state";
-import { type LabelPlacement, layOutLabels, placeBeside, type Size } from "./tag-layout";
+import { type LabelPlacement, layOutLabels, placeBeside, type Side, type Size } from "./tag-layout";
 
 export interface ScreenPoint {
   x: number;
@@ -77,11 +77,13 @@ export function createNameTags(
     layer.append(root);
     return { name, letter, limb, button, root, content: "", sizes: [] as Size[] };
   });
-  /** Boxes that tags must not cover. */
+  /** Boxes that tags must not cover, those of the faces among them, and those of the bars. */
   let obstacles: readonly ScreenBox[] = [];
+  let faceBoxes: readonly ScreenBox[] = [];
+  let barBoxes: readonly ScreenBox[] = [];
   const invitation = element("div", { class: "tag invitation", hidden: true }, translate("Take a hand"));
   layer.append(invitation);
-  let invitationState: { size: Size; side: number } | null = null;
+  let invitationState: { size: Size; side: Side | null } | null = null;
   return {
     render(limbs, bars, faces, now, selected = 0) {
       setAttribute(layer, "data-several", limbs.length > LIMBS.length);
@@ -108,6 +110,8 @@ export function createNameTags(
         }
         return { bar, sizes: tag.sizes, rank: holder.mine ? 0 : performerOfLimb(i) === selected ? 1 : 2 };
       });
+      faceBoxes = faces;
+      barBoxes = labels.flatMap((label) => label?.bar ?? []);
       obstacles = invitationState || labels.some(Boolean) ? [...faces, ...getObstacles()] : [];
       placements = layOutLabels(labels, obstacles, placements, { width, height, top }, now);
       tags.forEach(({ root }, i) => {
@@ -126,15 +130,23 @@ export function createNameTags(
       }
       if (!invitationState || invitationState.size.width === 0) {
         invitation.hidden = false;
-        invitationState = { size: { width: invitation.offsetWidth, height: invitation.offsetHeight }, side: 0 };
+        invitationState = { size: { width: invitation.offsetWidth, height: invitation.offsetHeight }, side: null };
       }
-      const taken = [...obstacles, ...placements.flatMap((placement) => placement?.box ?? [])];
+      const taken = [...obstacles, ...barBoxes, ...placements.flatMap((placement) => placement?.box ?? [])];
       const { size, side } = invitationState;
-      const placed = placeBeside(point, INVITATION_DISTANCE_PX, size, taken, { width, height, top }, side);
+      const sides = sidesAwayFrom(faceBoxes, point);
+      const placed = placeBeside(point, INVITATION_DISTANCE_PX, size, taken, { width, height, top }, side, sides);
       if (invitation.hidden !== !placed) invitation.hidden = !placed;
       if (!placed) return;
       invitationState.side = placed.side;
       invitation.style.transform = `translate(${placed.box.left.toFixed(1)}px, ${placed.box.top.toFixed(1)}px)`;
     },
   };
+}
+
+/** Return the sides of a hand at `point`, the best first: towards the performer, whose face is nearest, is the worst. */
+function sidesAwayFrom(faces: readonly ScreenBox[], { x }: ScreenPoint): readonly Side[] {
+  const offsets = faces.map(({ left, right }) => x - (left + right) / 2);
+  const nearest = offsets.sort((a, b) => Math.abs(a) - Math.abs(b))[0] ?? 0;
+  return nearest >= 0 ? [0, 2, 3, 1] : [1, 2, 3, 0];
 }

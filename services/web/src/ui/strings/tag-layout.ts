@@ -70,7 +70,9 @@ export function layOutLabels(
   now: number,
 ): (LabelPlacement | null)[] {
   const entries = labels.flatMap((label, index) =>
-    label ? { index, label, last: previous[index] ?? null, candidates: candidatePositions(label, viewport) } : [],
+    label
+      ? { index, label, last: previous[index] ?? null, candidates: candidatePositions(label, obstacles, viewport) }
+      : [],
   );
   entries.sort((a, b) => a.label.rank - b.label.rank);
   const fixed = [...obstacles, ...entries.map(({ label }) => label.bar)];
@@ -105,9 +107,12 @@ export function layOutLabels(
   return placements;
 }
 
+/** Side of a point: right, left, above or below it. */
+export type Side = 0 | 1 | 2 | 3;
+
 /**
  * Return a box of the given size at a `distance` from a point, clear of `obstacles`: on `previousSide` if possible,
- * else right, left, above or below the point (sides 0 to 3). Returns null if no side has space.
+ * else on the first of `sides` with space. Returns null if none has.
  */
 export function placeBeside(
   { x, y }: { x: number; y: number },
@@ -115,19 +120,20 @@ export function placeBeside(
   { width, height }: Size,
   obstacles: readonly ScreenBox[],
   viewport: LabelViewport,
-  previousSide: number,
-): { box: ScreenBox; side: number } | null {
+  previousSide: Side | null,
+  sides: readonly Side[] = [0, 1, 2, 3],
+): { box: ScreenBox; side: Side } | null {
   const corners = [
     [x + distance, y - height / 2],
     [x - distance - width, y - height / 2],
     [x - width / 2, y - distance - height],
     [x - width / 2, y + distance],
   ] as const;
-  const sides = corners.map(([left, top], side) => ({
-    side,
-    box: { left, top, right: left + width, bottom: top + height },
-  }));
-  const free = sides.filter(({ box }) => isInsideViewport(box, viewport) && isFree(box, obstacles));
+  const candidates = sides.map((side) => {
+    const [left, top] = corners[side];
+    return { side, box: { left, top, right: left + width, bottom: top + height } };
+  });
+  const free = candidates.filter(({ box }) => isInsideViewport(box, viewport) && isFree(box, obstacles));
   return free.find(({ side }) => side === previousSide) ?? free[0] ?? null;
 }
 
@@ -200,10 +206,14 @@ function reservedBoxes(
   );
 }
 
-/** Return the positions of all forms that are inside the picture, the best first. */
-function candidatePositions({ bar, sizes }: TagLabel, viewport: LabelViewport): CandidatePosition[] {
-  const isVisible = bar.right > 0 && bar.left < viewport.width && bar.bottom > 0 && bar.top < viewport.height;
-  if (!isVisible) return [];
+/** Return the positions of all forms that are inside the picture, the best first. There are none for a hidden bar. */
+function candidatePositions(
+  { bar, sizes }: TagLabel,
+  obstacles: readonly ScreenBox[],
+  viewport: LabelViewport,
+): CandidatePosition[] {
+  const isInPicture = bar.right > 0 && bar.left < viewport.width && bar.bottom > 0 && bar.top < viewport.height;
+  if (!isInPicture || obstacles.some((obstacle) => contains(obstacle, bar))) return [];
   return sizes.flatMap((formSize, size) => {
     const gap = size > 0 && size === sizes.length - 1 ? SHORTEST_TAG_GAP_PX : TAG_GAP_PX;
     const candidates = anchorBoxes(bar, formSize, gap, viewport.width).map((box, place) => ({ box, size, place }));
@@ -231,6 +241,12 @@ function anchorBoxes(bar: ScreenBox, { width, height }: Size, gap: number, viewp
     const left = Math.max(VIEWPORT_MARGIN_PX, Math.min(viewportWidth - VIEWPORT_MARGIN_PX - width, x));
     return { left, top: y, right: left + width, bottom: y + height };
   });
+}
+
+function contains(outer: ScreenBox, inner: ScreenBox): boolean {
+  return (
+    outer.left <= inner.left && outer.right >= inner.right && outer.top <= inner.top && outer.bottom >= inner.bottom
+  );
 }
 
 function isInsideViewport(box: ScreenBox, { width, height, top }: LabelViewport): boolean {

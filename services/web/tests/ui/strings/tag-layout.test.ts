@@ -264,4 +264,16 @@ describe("invitation", () => {
     expect(placeBeside({ x: 1380, y: 400 }, 26, size, [], PICTURE, 0)?.side).toBe(1);
     expect(placeBeside(at, 26, size, [{ left: 0, top: 0, right: 1440, bottom: 900 }], PICTURE, 0)).toBe(null);
   });
+
+  test("tries the given sides in their order", () => {
+    expect(placeBeside(at, 26, size, [], PICTURE, null, [1, 2, 3, 0])?.side).toBe(1);
+    expect(placeBeside({ x: 20, y: 400 }, 26, size, [], PICTURE, null, [1, 2, 3, 0])?.side).toBe(0);
+    expect(placeBeside({ x: 80, y: 400 }, 26, size, [], PICTURE, null, [1, 2, 3, 0])?.side).toBe(2);
+  });
+});
+
+test("a bar that is hidden behind an obstacle has no tag", () => {
+  const panel = { left: 600, top: 200, right: 1000, bottom: 600 };
+  expect(lay([label(700, 300)], [panel])[0]?.box).toBe(null);
+  expect(lay([label(590, 300)], [panel])[0]?.box).not.toBe(null);
 });
