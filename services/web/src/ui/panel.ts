@@ -59,6 +59,8 @@ const DOCK_WIDTH_PX = 96;
 /** Widths on a landscape phone, where a sheet has a maximum share of the window's width (`style/sideways.css`). */
 const [SHEET_MAX_WIDTH_PX, SHEET_MAX_WIDTH_SHARE] = [340, 0.56];
 const LANDSCAPE_DOCK_WIDTH_PX = 112;
+/** Smallest windows with space for panels at both sides, and for two panels at the right, one above the other. */
+const [TWO_SIDES_MIN_WIDTH_PX, TWO_PANELS_MIN_HEIGHT_PX] = [900, 740];
 
 /**
  * Manage which panels are open. `onToggle` is called for every panel that opens or closes, `onResize` when one changes
@@ -81,7 +83,7 @@ export function createPanels(
     panel.hidden = !open;
     order.splice(0, order.length, ...order.filter((other) => other !== name));
     if (open) {
-      if (PHONE.matches) for (const other of [...order]) set(other, false);
+      for (const other of [...order]) if (!fitBeside(name, other)) set(other, false);
       order.push(name);
       if (focused instanceof HTMLElement && focused !== document.body) openers.set(name, focused);
     }
@@ -120,4 +122,12 @@ export function createPanels(
       return [insetOf("library"), insetOf("strings", "line")] as const;
     },
   };
+}
+
+/** Return whether the window has space for both panels. */
+function fitBeside(name: PanelName, other: PanelName): boolean {
+  if (PHONE.matches) return false;
+  return (name === "library") === (other === "library")
+    ? innerHeight >= TWO_PANELS_MIN_HEIGHT_PX
+    : innerWidth >= TWO_SIDES_MIN_WIDTH_PX;
 }

@@ -10,7 +10,7 @@ export type PanelName = "library" | "strings" | "line";
 export type LinkHealth = "good" | "poor" | "lost" | "none";
 
 export interface Transport {
-  /** Elements that cover the picture. On a phone some buttons stand outside the bar. */
+  /** Elements that cover the picture. */
   readonly parts: readonly HTMLElement[];
   readonly sound: SoundControl;
   setTimeline(playing: boolean, loop: boolean, ready: boolean): void;
@@ -142,10 +142,7 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
   const tools = element(
     "div",
     { class: "tools" },
-    loop,
-    camera,
-    sound.element,
-    picture,
+    element("div", { class: "stage-tools" }, loop, camera, sound.element, picture),
     recordButton,
     element("span", { class: "tools-rule" }),
     ...pills.values(),
@@ -160,7 +157,7 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
   root.append(bar);
   let shown = "";
   return {
-    parts: [bar, camera, picture, sound.element],
+    parts: [bar],
     sound,
     setTimeline(playing, looping, isReady) {
       ready = isReady;
