@@ -25,6 +25,7 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
     tabindex: 0,
     "aria-label": translate("Seek"),
     "aria-valuemin": 0,
+    "aria-valuenow": 0,
   });
   let cells: SeekCell[] = [];
   let marks: HTMLElement[] = [];
