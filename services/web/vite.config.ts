@@ -62,7 +62,7 @@ export default defineConfig({
         test: {
           name: "node",
           include: ["tests/**/*.test.ts"],
-          exclude: ["tests/browser/**"],
+          exclude: ["tests/browser/**", "tests/webdriver/**"],
           // Files share their modules: most of them run for less time than their imports take to load.
           isolate: false,
           pool: "threads",
@@ -73,7 +73,7 @@ export default defineConfig({
         extends: true,
         test: {
           name: "browser",
-          include: ["tests/browser/*.test.ts"],
+          include: ["tests/browser/*.test.ts", "tests/webdriver/*.test.ts"],
           globalSetup: "tests/browser/global-setup.ts",
           sequence: { groupOrder: 1 },
         },

@@ -1,9 +1,10 @@
 /** Test suites that run in Chromium against a server. They share browsers and servers; each test has its own session. */
 import { randomUUID } from "node:crypto";
 import type { Browser, BrowserContextOptions, Page } from "playwright-core";
-import { afterAll, beforeAll, beforeEach, describe, inject, onTestFinished } from "vitest";
+import { afterAll, beforeAll, beforeEach, describe, onTestFinished } from "vitest";
 import { chromiumPath, connectToChromium, PAGE_TIMEOUT_MS } from "./chromium";
 import { type ConnectionProxy, startProxy } from "./connection-proxy";
+import { getShared } from "./shared-endpoint";
 import type { ServerKind, SharedServer } from "./shared-resources";
 import { limitFrameRate } from "./slow-display";
 
@@ -149,11 +150,4 @@ function pageAddress(address: string, server: string, session: string | null): s
   if (session && isPage && !url.searchParams.has("session") && !url.searchParams.has("motion"))
     url.searchParams.set("session", session);
   return url.href;
-}
-
-/** Get a shared resource, which starts if it has not. */
-async function getShared<T>(path: string): Promise<T> {
-  const response = await fetch(inject("sharedResources") + path);
-  if (!response.ok) throw new Error(await response.text());
-  return (await response.json()) as T;
 }

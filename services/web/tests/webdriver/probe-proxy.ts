@@ -1,0 +1,65 @@
+/**
+ * HTTP proxy before a server that adds a script to each page, before the page's own. WebDriver has no way to do this, and
+ * no access to the console.
+ */
+import { createServer, request as sendRequest } from "node:http";
+import { type AddressInfo, connect } from "node:net";
+import { text } from "node:stream/consumers";
+
+/** Path of the script. */
+const PROBE_PATH = "/probe-of-tests.js";
+
+export interface ProbeProxy {
+  /** Base URL, without a trailing slash. */
+  readonly url: string;
+  stop(): Promise<void>;
+}
+
+/** Start a proxy of the server at `target`, whose pages run `script` first. */
+export async function startProbeProxy(target: string, script: string): Promise<ProbeProxy> {
+  const { hostname, port } = new URL(target);
+  const proxy = createServer((request, response) => {
+    if (request.url === PROBE_PATH) {
+      response.writeHead(200, { "Content-Type": "text/javascript" }).end(script);
+      return;
+    }
+    const { "accept-encoding": _, ...headers } = request.headers;
+    const { method, url: path } = request;
+    const forwarded = sendRequest({ hostname, port, method, path, headers }, async (answer) => {
+      const { statusCode = 502, headers } = answer;
+      if (!headers["content-type"]?.startsWith("text/html")) {
+        answer.pipe(response.writeHead(statusCode, headers));
+        return;
+      }
+      const { "content-length": _, ...others } = headers;
+      const page = (await text(answer)).replace("<head>", `$&<script src="${PROBE_PATH}"></script>`);
+      response.writeHead(statusCode, others).end(page);
+    });
+    forwarded.on("error", () => response.destroy());
+    response.on("close", () => forwarded.destroy());
+    request.pipe(forwarded);
+  });
+  proxy.on("upgrade", ({ method, url: path, rawHeaders }, client, head) => {
+    const server = connect(Number(port), hostname);
+    const lines = Array.from(
+      { length: rawHeaders.length / 2 },
+      (_, i) => `${rawHeaders[2 * i]}: ${rawHeaders[2 * i + 1]}`,
+    );
+    server.write([`${method} ${path} HTTP/1.1`, ...lines, "", ""].join("\r\n"));
+    server.write(head);
+    for (const [from, to] of [
+      [client, server],
+      [server, client],
+    ] as const)
+      from.pipe(to).on("error", () => from.destroy());
+  });
+  await new Promise<void>((done) => proxy.listen(0, "127.0.0.1", done));
+  return {
+    url: `http://127.0.0.1:${(proxy.address() as AddressInfo).port}`,
+    async stop() {
+      const closed = new Promise((done) => proxy.close(done));
+      proxy.closeAllConnections();
+      await closed;
+    },
+  };
+}

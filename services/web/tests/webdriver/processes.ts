@@ -1,0 +1,71 @@
+/** Processes of browsers and displays. */
+import { type ChildProcess, spawn } from "node:child_process";
+import { existsSync } from "node:fs";
+import { createServer } from "node:net";
+import { delimiter, join } from "node:path";
+import { createInterface } from "node:readline";
+import type { Readable } from "node:stream";
+
+/** Return the path of an installed program, or null if there is none. */
+export function findProgram(name: string): string | null {
+  const folders = (process.env["PATH"] ?? "").split(delimiter);
+  return folders.map((folder) => join(folder, name)).find((path) => existsSync(path)) ?? null;
+}
+
+/** Start a program. Its descriptor 3 is a pipe. */
+export function startProcess(program: string, args: string[], env: NodeJS.ProcessEnv = {}): ChildProcess {
+  return spawn(program, args, {
+    stdio: ["ignore", "pipe", "pipe", "pipe"],
+    env: { ...process.env, ...env },
+  });
+}
+
+/** Return the first match of `pattern` in the lines of `output`. Rejects if the process ends before. */
+export function findInOutput(started: ChildProcess, output: Readable, pattern: RegExp): Promise<string> {
+  const program = started.spawnfile;
+  return new Promise((resolve, reject) => {
+    const lines: string[] = [];
+    createInterface(output).on("line", (line) => {
+      const found = pattern.exec(line)?.[1];
+      if (found !== undefined) resolve(found);
+      else if (lines.length < 50) lines.push(line);
+    });
+    started.once("error", reject);
+    started.once("exit", (code) =>
+      reject(new Error(`${program} exited with ${code} before it printed ${pattern}. Output: ${lines.join("\n")}`)),
+    );
+  });
+}
+
+/** End a program. */
+export async function stopProcess(started: ChildProcess): Promise<void> {
+  if (started.pid === undefined || started.exitCode !== null || started.signalCode !== null) return;
+  const exited = new Promise((resolve) => started.once("exit", resolve));
+  started.kill();
+  await exited;
+}
+
+/** Return a TCP port that is free now. */
+export function findFreePort(): Promise<number> {
+  return new Promise((resolve, reject) => {
+    const server = createServer();
+    server.once("error", reject);
+    server.listen(0, "127.0.0.1", () => {
+      const address = server.address();
+      server.close(() => resolve(typeof address === "object" && address ? address.port : 0));
+    });
+  });
+}
+
+/** A display in memory. */
+export interface VirtualDisplay {
+  /** Value of `DISPLAY`. */
+  readonly name: string;
+  stop(): Promise<void>;
+}
+
+export async function startVirtualDisplay(): Promise<VirtualDisplay> {
+  const server = startProcess("Xvfb", ["-displayfd", "3", "-screen", "0", "1024x800x24", "-nolisten", "tcp"]);
+  const number = await findInOutput(server, server.stdio[3] as Readable, /^(\d+)$/);
+  return { name: `:${number}`, stop: () => stopProcess(server) };
+}

@@ -1,0 +1,3 @@
+import { definePageCases } from "./page-cases";
+
+definePageCases("WebKitGTK");

@@ -1,0 +1,154 @@
+/** WebKitGTK through its driver, by the HTTP protocol of W3C WebDriver. */
+import type { ChildProcess } from "node:child_process";
+import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import type { WindowSize } from "./browser";
+import {
+  type Browser,
+  type BrowserSession,
+  type BrowserWindow,
+  COMMAND_TIMEOUT_MS,
+  type SessionOptions,
+  WAIT_TIMEOUT_MS,
+} from "./browser";
+import { findFreePort, startProcess, startVirtualDisplay, stopProcess, type VirtualDisplay } from "./processes";
+
+/** Key of a reference to an element (W3C WebDriver, 12.1). */
+const ELEMENT_KEY = "element-6066-11e4-a52e-4f735466cecf";
+
+/** Send a command and return the value of its response. */
+async function send<Value>(method: string, url: string, parameters: Record<string, unknown> = {}): Promise<Value> {
+  const response = await fetch(url, {
+    method,
+    body: method === "POST" ? JSON.stringify(parameters) : null,
+    signal: AbortSignal.timeout(COMMAND_TIMEOUT_MS),
+  });
+  const { value } = (await response.json()) as { value: Value & { error?: string; message?: string } };
+  if (!response.ok) throw new Error(`${method} ${new URL(url).pathname}: ${value.error}: ${value.message}`);
+  return value;
+}
+
+export async function startWebKit(program: string): Promise<Browser> {
+  const folder = mkdtempSync(join(tmpdir(), "bunraku-webkit-"));
+  const downloads = join(folder, "Downloads");
+  for (const path of [downloads, join(folder, ".config/gtk-3.0")]) mkdirSync(path, { recursive: true });
+  writeFileSync(join(folder, ".config/user-dirs.dirs"), 'XDG_DOWNLOAD_DIR="$HOME/Downloads"\n');
+  // The page prefers reduced motion.
+  writeFileSync(join(folder, ".config/gtk-3.0/settings.ini"), "[Settings]\ngtk-enable-animations=0\n");
+  const display = await startVirtualDisplay();
+  const url = `http://127.0.0.1:${await findFreePort()}`;
+  const driver = startProcess(program, [`--port=${new URL(url).port}`], {
+    DISPLAY: display.name,
+    HOME: folder,
+    XDG_CONFIG_HOME: join(folder, ".config"),
+  });
+  for (const output of [driver.stdout, driver.stderr]) output?.resume();
+  await waitForDriver(driver, url);
+  return new WebKit(url, driver, display, folder, downloads);
+}
+
+/** Wait until the driver accepts commands. */
+async function waitForDriver(driver: ChildProcess, url: string): Promise<void> {
+  const deadline = Date.now() + WAIT_TIMEOUT_MS;
+  while (driver.exitCode === null) {
+    const isReady = await send("GET", `${url}/status`).then(
+      () => true,
+      () => false,
+    );
+    if (isReady) return;
+    if (Date.now() > deadline) break;
+    await new Promise((resolve) => setTimeout(resolve, 50));
+  }
+  throw new Error(`WebKitWebDriver does not answer at ${url} (exit code ${driver.exitCode})`);
+}
+
+class WebKit implements Browser {
+  constructor(
+    private readonly url: string,
+    private readonly driver: ChildProcess,
+    private readonly display: VirtualDisplay,
+    private readonly folder: string,
+    private readonly downloads: string,
+  ) {}
+
+  async openSession({ hasStorage = true }: SessionOptions = {}): Promise<BrowserSession> {
+    const storage = ["--enable-html5-local-storage=false", "--enable-html5-database=false"];
+    const args = ["--automation", ...(hasStorage ? [] : storage)];
+    const { sessionId } = await send<{ sessionId: string }>("POST", `${this.url}/session`, {
+      capabilities: { alwaysMatch: { "webkitgtk:browserOptions": { args } } },
+    });
+    const url = `${this.url}/session/${sessionId}`;
+    await send("POST", `${url}/timeouts`, { script: COMMAND_TIMEOUT_MS, pageLoad: COMMAND_TIMEOUT_MS });
+    let isFirst = true;
+    return {
+      errors: [],
+      downloads: this.downloads,
+      async open(address, size) {
+        const handle = isFirst
+          ? await send<string>("GET", `${url}/window`)
+          : (await send<{ handle: string }>("POST", `${url}/window/new`, { type: "window" })).handle;
+        isFirst = false;
+        const window = new WebKitWindow(url, handle);
+        if (size) await window.resize(size);
+        await window.goto(address);
+        return window;
+      },
+      close: () => send("DELETE", url),
+    };
+  }
+
+  async close(): Promise<void> {
+    await stopProcess(this.driver);
+    await this.display.stop();
+    rmSync(this.folder, { recursive: true, force: true });
+  }
+}
+
+class WebKitWindow implements BrowserWindow {
+  constructor(
+    private readonly session: string,
+    private readonly handle: string,
+  ) {}
+
+  async resize(size: WindowSize): Promise<void> {
+    await this.#send("/window/rect", { ...size });
+  }
+
+  async goto(url: string): Promise<void> {
+    await this.#send("/url", { url });
+  }
+
+  call(declaration: string, argument: string): Promise<string> {
+    return this.#send("/execute/sync", { script: `return (${declaration})(arguments[0])`, args: [argument] });
+  }
+
+  async perform(...actions: unknown[]): Promise<void> {
+    await this.#send("/actions", { actions });
+  }
+
+  async chooseFile(selector: string, path: string): Promise<void> {
+    const element = await this.#send<Record<string, string>>("/element", { using: "css selector", value: selector });
+    await this.#send(`/element/${element[ELEMENT_KEY]}/value`, { text: path });
+  }
+
+  async screenshot(): Promise<string> {
+    await this.#select();
+    return send("GET", `${this.session}/screenshot`);
+  }
+
+  async close(): Promise<void> {
+    await this.#select();
+    await send("DELETE", `${this.session}/window`);
+  }
+
+  async #send<Value>(command: string, parameters: Record<string, unknown>): Promise<Value> {
+    await this.#select();
+    return send("POST", this.session + command, parameters);
+  }
+
+  /** Commands apply to the selected window of the session. */
+  async #select(): Promise<void> {
+    await send("POST", `${this.session}/window`, { handle: this.handle });
+  }
+}
