@@ -3,7 +3,7 @@ import { randomUUID } from "node:crypto";
 import { afterAll, beforeAll, beforeEach, describe, expect, onTestFinished } from "vitest";
 import { getShared } from "../browser/shared-endpoint";
 import type { SharedServer } from "../browser/shared-resources";
-import { SLOW_FRAME_INTERVAL_MS, slowDownDisplay } from "../browser/slow-display";
+import { slowDownDisplay } from "../browser/slow-display";
 import type { Browser, BrowserSession, BrowserWindow, SessionOptions, WindowSize } from "./browser";
 import { WAIT_TIMEOUT_MS } from "./browser";
 import { startFirefox } from "./firefox";
@@ -13,7 +13,9 @@ import { findProgram } from "./processes";
 import { startWebKit } from "./webkit";
 
 /** Small, because the browsers render in software. */
-const WINDOW_SIZE: WindowSize = { width: 760, height: 520 };
+const WINDOW_SIZE: WindowSize = { width: 600, height: 420 };
+/** Interval between frames, in milliseconds: WebKitGTK draws in the thread of the page, which must not be blocked. */
+const FRAME_INTERVAL_MS = 250;
 
 const BROWSERS = {
   Firefox: { programs: ["firefox-esr", "Xvfb"], start: startFirefox },
@@ -74,7 +76,7 @@ function collectErrors(): void {
 }
 
 /** Script that runs before those of each page. */
-const PROBE = `(${collectErrors})(); (${slowDownDisplay})(${SLOW_FRAME_INTERVAL_MS});`;
+const PROBE = `(${collectErrors})(); (${slowDownDisplay})(${FRAME_INTERVAL_MS});`;
 
 /** Define a suite for a browser. Where the browser is not installed, it is skipped with a warning; in CI it fails. */
 export function describeInWebDriver(name: BrowserName, defineTests: (fixture: WebDriverFixture) => void): void {
