@@ -14,7 +14,7 @@ export function limitFrameRate(page: Page): Promise<void> {
  * In a page before its scripts, or in a worker: leave `intervalMs` between the frames that run animation callbacks. The
  * browser still runs each callback, so timestamps and errors are its own.
  */
-function slowDownDisplay(intervalMs: number): void {
+export function slowDownDisplay(intervalMs: number): void {
   const request = globalThis.requestAnimationFrame.bind(globalThis);
   const cancel = globalThis.cancelAnimationFrame.bind(globalThis);
   const startTimer = globalThis.setTimeout.bind(globalThis);
