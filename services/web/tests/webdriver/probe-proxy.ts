@@ -1,13 +1,21 @@
 /**
- * HTTP proxy before a server that adds a script to each page, before the page's own. WebDriver has no way to do this, and
+ * HTTP proxy before a server that adds a script to each page and its worker, before their own. WebDriver has no way to do this, and
  * no access to the console.
  */
 import { createServer, request as sendRequest } from "node:http";
 import { type AddressInfo, connect } from "node:net";
 import { text } from "node:stream/consumers";
 
-/** Path of the script. */
+/** Path of the script of the pages. */
 const PROBE_PATH = "/probe-of-tests.js";
+/** Script of the page's worker. */
+const WORKER_PATH = /\/worker-engine-[\w-]+\.js$/;
+
+/** Scripts that run before those of pages, and before those of their workers. */
+export interface Probes {
+  readonly page: string;
+  readonly worker: string;
+}
 
 export interface ProbeProxy {
   /** Base URL, without a trailing slash. */
@@ -15,25 +23,32 @@ export interface ProbeProxy {
   stop(): Promise<void>;
 }
 
-/** Start a proxy of the server at `target`, whose pages run `script` first. */
-export async function startProbeProxy(target: string, script: string): Promise<ProbeProxy> {
+/** Start a proxy of the server at `target`, whose pages and workers run `probes` first. */
+export async function startProbeProxy(target: string, probes: Probes): Promise<ProbeProxy> {
   const { hostname, port } = new URL(target);
   const proxy = createServer((request, response) => {
     if (request.url === PROBE_PATH) {
-      response.writeHead(200, { "Content-Type": "text/javascript" }).end(script);
+      response.writeHead(200, { "Content-Type": "text/javascript" }).end(probes.page);
       return;
     }
     const { "accept-encoding": _, ...headers } = request.headers;
     const { method, url: path } = request;
     const forwarded = sendRequest({ hostname, port, method, path, headers }, async (answer) => {
       const { statusCode = 502, headers } = answer;
-      if (!headers["content-type"]?.startsWith("text/html")) {
+      const isPage = headers["content-type"]?.startsWith("text/html");
+      if (!isPage && !WORKER_PATH.test(path ?? "")) {
         answer.pipe(response.writeHead(statusCode, headers));
         return;
       }
       const { "content-length": _, ...others } = headers;
-      const page = (await text(answer)).replace("<head>", `$&<script src="${PROBE_PATH}"></script>`);
-      response.writeHead(statusCode, others).end(page);
+      const content = await text(answer);
+      response
+        .writeHead(statusCode, others)
+        .end(
+          isPage
+            ? content.replace("<head>", `$&<script src="${PROBE_PATH}"></script>`)
+            : `${probes.worker}\n${content}`,
+        );
     });
     forwarded.on("error", () => response.destroy());
     response.on("close", () => forwarded.destroy());

@@ -14,7 +14,7 @@ import { startWebKit } from "./webkit";
 
 /** Small, because the browsers render in software. */
 const WINDOW_SIZE: WindowSize = { width: 600, height: 420 };
-/** Interval between frames, in milliseconds: WebKitGTK draws in the thread of the page, which must not be blocked. */
+/** Interval between frames, in milliseconds: the browsers render in software. */
 const FRAME_INTERVAL_MS = 250;
 
 const BROWSERS = {
@@ -75,8 +75,9 @@ function collectErrors(): void {
   };
 }
 
-/** Script that runs before those of each page. */
-const PROBE = `(${collectErrors})(); (${slowDownDisplay})(${FRAME_INTERVAL_MS});`;
+const SLOW_DISPLAY = `(${slowDownDisplay})(${FRAME_INTERVAL_MS});`;
+/** Scripts that run before those of each page and worker. Errors of a worker are reported by its page. */
+const PROBES = { page: `(${collectErrors})(); ${SLOW_DISPLAY}`, worker: SLOW_DISPLAY };
 
 /** Define a suite for a browser. Where the browser is not installed, it is skipped with a warning; in CI it fails. */
 export function describeInWebDriver(name: BrowserName, defineTests: (fixture: WebDriverFixture) => void): void {
@@ -96,7 +97,7 @@ export function describeInWebDriver(name: BrowserName, defineTests: (fixture: We
 
     beforeAll(async () => {
       server = await getShared<SharedServer>("/server?kind=open");
-      proxy = await startProbeProxy(server.url, PROBE);
+      proxy = await startProbeProxy(server.url, PROBES);
       browser = await start(findProgram(programs[0]) ?? "");
     }, 4 * WAIT_TIMEOUT_MS);
     afterAll(async () => {
@@ -152,7 +153,7 @@ export function describeInWebDriver(name: BrowserName, defineTests: (fixture: We
       state: () => request("GET", `/v1/sessions/${session}`),
       async publish(html) {
         const path = `/${randomUUID()}`;
-        await fetch(server.site.origin + path, { method: "PUT", body: `<script>${PROBE}</script>${html}` });
+        await fetch(server.site.origin + path, { method: "PUT", body: `<script>${PROBES.page}</script>${html}` });
         return server.site.origin + path;
       },
     });
