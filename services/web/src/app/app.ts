@@ -64,6 +64,7 @@ export class App implements AppParts {
       (state) => page.transport.sound.render(state),
       page.transport.sound.element,
       browserSoundPreference,
+      () => page.toast(translate("This browser plays no sound here. Check its audio device.")),
     );
     this.stageHost = new StageHost({
       canvas,

@@ -32,6 +32,12 @@ export interface SoundSource extends EventTarget {
   leader: ((nowMs: number) => LeaderTime | null) | null;
 }
 
+/**
+ * Time after which a browser that was allowed to play sound and does not is reported, in milliseconds. Without an audio
+ * device, an audio context may wait for ever.
+ */
+const START_TIMEOUT_MS = 8_000;
+
 /** Events that browsers accept as the user activation that audio playback requires. */
 const USER_ACTIVATION_EVENTS = ["pointerdown", "pointerup", "click", "keydown"] as const;
 
@@ -44,13 +50,19 @@ export class SoundController {
   #audioStore: AudioPackets | null = null;
   /** Set while the gesture that resumed the sound is handled: its own command must not switch the sound off again. */
   #resumedByGesture = false;
+  /** Timer of `START_TIMEOUT_MS`; undefined before a gesture, and null after it has reported. */
+  #startTimer: ReturnType<typeof setTimeout> | undefined | null;
   readonly #abortController = new AbortController();
 
-  /** Gestures within `button` do not resume the sound, since the button toggles it itself. */
+  /**
+   * Gestures within `button` do not resume the sound, since the button toggles it itself. `onSilence` is called once if
+   * the browser plays no sound although it was allowed to.
+   */
   constructor(
     private readonly onChange: (state: SoundState) => void,
     button: Element,
     private readonly preferenceStore: SoundPreferenceStore,
+    private readonly onSilence: () => void = () => undefined,
   ) {
     this.#preference = preferenceStore.load();
     for (const gesture of USER_ACTIVATION_EVENTS) {
@@ -84,6 +96,7 @@ export class SoundController {
   toggle(): void {
     if (this.#resumedByGesture || !this.#audioStore) return;
     this.setPreference({ ...this.#preference, on: !this.#speaker?.heard });
+    this.#expectSound();
   }
 
   /** Set the volume, 0 to 1, and switch the sound on. */
@@ -103,6 +116,7 @@ export class SoundController {
   close(): void {
     this.#abortController.abort();
     this.setViewer(null);
+    clearTimeout(this.#startTimer ?? undefined);
     this.#speaker?.close();
   }
 
@@ -117,8 +131,20 @@ export class SoundController {
     const speaker = this.#speaker;
     if (!speaker || speaker.heard || !this.#preference.on || !this.#audioStore) return;
     speaker.resume();
+    this.#expectSound();
     this.#resumedByGesture = true;
     setTimeout(() => (this.#resumedByGesture = false));
+  }
+
+  /** Report, once, a browser that plays no sound some time after a gesture that started it. */
+  #expectSound(): void {
+    if (this.#startTimer !== undefined) return;
+    this.#startTimer = setTimeout(() => {
+      this.#startTimer = undefined;
+      if (!this.#preference.on || !this.#audioStore || this.#speaker?.heard) return;
+      this.#startTimer = null;
+      this.onSilence();
+    }, START_TIMEOUT_MS);
   }
 
   /** Replace the player if the motion changed; create one if the motion has sound and sound is wanted. */

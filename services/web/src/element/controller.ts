@@ -81,6 +81,7 @@ export class ElementController {
       },
       this.#view.soundButton,
       soundPreference,
+      () => this.#view.toast(this.translator.translate("This browser plays no sound here. Check its audio device.")),
     );
     this.renderer = new ElementRenderer(this.#view, this.#limbController);
     this.renderer.onFirstPose = () => this.emit("ready");

@@ -160,6 +160,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   "writing the file": "書き出し中",
   "Saved {name}": "保存しました：{name}",
   "Save a picture": "写真を保存",
+  "This browser plays no sound here. Check its audio device.":
+    "このブラウザーでは音が出せません。音声デバイスを確認してください。",
   "The picture could not be drawn. Try again": "写真を作れませんでした。もう一度お試しください",
   "save a picture of the stage": "舞台の写真を保存",
   "Upload of {name}": "「{name}」のアップロード",

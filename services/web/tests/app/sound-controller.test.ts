@@ -1,7 +1,6 @@
 import { afterEach, beforeEach, describe, expect, test, vi } from "vitest";
-import { SoundController, type SoundState } from "../../src/app/sound-controller";
+import { SoundController, type SoundSource, type SoundState } from "../../src/app/sound-controller";
 import { browserSoundPreference, type SoundPreference, type SoundPreferenceStore } from "../../src/audio/preference";
-import type { Viewer } from "../../src/client/viewer";
 import { stubStorage } from "../storage/storage-stub";
 
 const { players, speakers } = vi.hoisted(() => ({
@@ -88,7 +87,7 @@ afterEach(() => void vi.unstubAllGlobals());
 function createController(preferenceStore: SoundPreferenceStore = browserSoundPreference): void {
   viewer = new FakeViewer();
   controller = new SoundController((state) => states.push(state), button, preferenceStore);
-  controller.setViewer(viewer as unknown as Viewer);
+  controller.setViewer(viewer as unknown as SoundSource);
 }
 
 /** Dispatch a user gesture, after which the browser allows sound. */
@@ -135,6 +134,28 @@ describe("motion with sound", () => {
     speakers[1].allowed = true;
     page.dispatchEvent(new Event("click"));
     expect(speakers[1].heard).toBe(true);
+  });
+
+  test("a browser that plays no sound after a gesture is reported once", async () => {
+    vi.useFakeTimers();
+    let reports = 0;
+    controller = new SoundController(
+      (state) => states.push(state),
+      button,
+      browserSoundPreference,
+      () => reports++,
+    );
+    const opened = speakers.length;
+    controller.setViewer(viewer as unknown as SoundSource);
+    vi.advanceTimersByTime(60_000);
+    // Without a gesture every browser is silent.
+    expect([speakers.length - opened, reports]).toEqual([1, 0]);
+    for (let press = 0; press < 3; press++) {
+      page.dispatchEvent(new Event("keydown"));
+      vi.advanceTimersByTime(10_000);
+    }
+    expect(reports).toBe(1);
+    vi.useRealTimers();
   });
 
   test("press of the sound button does not count as a gesture", () => {
