@@ -1,5 +1,6 @@
 /** Controls of limbs on the page: keys, gamepad, buttons and panels act on limbs that are in the engine. */
-import type { EngineCommand, LimbAction, StageState } from "../engine/message";
+import type { ClaimState } from "../engine/claim-controller";
+import type { EngineCommand, LimbAction } from "../engine/message";
 import type { PageActions } from "../input/command-dispatcher";
 import { RemoteCommands } from "../input/remote-commands";
 
@@ -37,8 +38,9 @@ export class LimbControls {
     return this.#holdsLimb;
   }
 
-  /** Follow the state of the stage. */
-  update({ selectedLimb, holdsLimb }: Pick<StageState, "selectedLimb" | "holdsLimb">): void {
+  /** Follow the claims of this page, which change as soon as the engine has handled an input. */
+  update({ performer, selectedLimb, holdsLimb }: Pick<ClaimState, "performer" | "selectedLimb" | "holdsLimb">): void {
+    this.performer = performer;
     this.#isLimbSelected = selectedLimb !== null;
     this.#holdsLimb = holdsLimb;
   }

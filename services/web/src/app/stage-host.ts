@@ -26,6 +26,8 @@ const NO_CLAIMS: ClaimState = {
   isReady: false,
   performer: 0,
   giveKey: null,
+  selectedLimb: null,
+  holdsLimb: false,
 };
 
 export interface StageHostOptions {
@@ -126,7 +128,7 @@ export class StageHost {
 
   /** Handle an event of the engine. */
   onEvent(event: EngineEvent): void {
-    const { invitation, limbs, page } = this.options;
+    const { limbs, page } = this.options;
     const playback = this.options.getPlayback();
     switch (event.type) {
       case "ready":
@@ -156,9 +158,6 @@ export class StageHost {
       case "limbs":
         this.#showLimbs(event.state);
         break;
-      case "holding":
-        if (event.isHoldingAny) invitation.finish();
-        break;
       case "toast": {
         const { ask } = event;
         if (ask) page.toast(event.message, { label: ask.label, key: ask.key, run: () => limbs.act("ask", ask.limb) });
@@ -184,18 +183,19 @@ export class StageHost {
     this.options.engine.post({ type: "set", settings });
   }
 
-  #showLimbs({ limbs, isReady, performer, giveKey }: ClaimState): void {
-    const { page } = this.options;
-    this.options.limbs.performer = performer;
+  #showLimbs(state: ClaimState): void {
+    const { invitation, page } = this.options;
+    const { limbs, isReady, performer, giveKey } = state;
+    this.options.limbs.update(state);
+    if (state.holdsLimb) invitation.finish();
     page.strings.render(limbs, isReady, performer);
     page.limbRequests.render(limbs, giveKey);
     page.library.danceAs.dancers(limbs, performer);
   }
 
   #setState(state: StageState): void {
-    const { canvas, limbs, page, startup } = this.options;
+    const { canvas, page, startup } = this.options;
     this.#state = state;
-    limbs.update(state);
     showPointerState(canvas, state);
     page.transport.setCamera(state.hasMotionCamera, state.followsMotionCamera);
     if (state.hasDrawnPerformer) startup.finish();

@@ -26,6 +26,10 @@ export interface ClaimState {
   readonly performer: number;
   /** Name of the key that hands a limb over, if there is one. */
   readonly giveKey: string | null;
+  /** Limb that inputs for "the held limb" move; null for none. */
+  readonly selectedLimb: number | null;
+  /** True if any limb is held by keys, gamepad or buttons, or pulled by a pointer. */
+  readonly holdsLimb: boolean;
 }
 
 /** Offer to ask the holder of a limb for it. */
@@ -134,11 +138,14 @@ export class ClaimController {
   }
 
   render(): void {
+    const { hands, velocity } = this.stageInputs ?? {};
     this.view.render({
       limbs: this.limbStates(),
       isReady: this.connected && this.#playback !== null && !this.viewOnly,
       performer: this.selectedPerformer.performer,
       giveKey: this.#keyHint("give"),
+      selectedLimb: velocity?.selectedLimb ?? null,
+      holdsLimb: hands?.isHoldingAny ?? false,
     });
   }
 

@@ -101,7 +101,7 @@ export class Engine {
       new chunk.StageController(this.canvas, this.#claims, {
         getMapping: () => this.#settings.mapping,
         actions: NO_ACTIONS,
-        onClaimsChange: () => this.#onClaimsChange(),
+        onClaimsChange: () => this.#claims.render(),
         graphics,
       }),
     );
@@ -234,11 +234,6 @@ export class Engine {
   #onEditError(error: unknown): void {
     const problem = error instanceof ProblemError ? { title: error.title, detail: error.detail } : null;
     this.send({ type: "edit failed", message: String(error), problem });
-  }
-
-  #onClaimsChange(): void {
-    this.send({ type: "holding", isHoldingAny: this.#controller?.hands.isHoldingAny ?? false });
-    this.#claims.render();
   }
 
   #onLimbAction(action: LimbAction, limb: number | null): void {

@@ -122,10 +122,6 @@ export interface StageState {
   /** True if the pointer is over a handle, or drags one. */
   readonly isPointerNear: boolean;
   readonly isPulling: boolean;
-  /** Limb that inputs for "the held limb" move. */
-  readonly selectedLimb: number | null;
-  /** True if any limb is held by keys, gamepad or buttons, or pulled by a pointer. */
-  readonly holdsLimb: boolean;
 }
 
 /** Time of a viewer: what a position and the sound are computed from between two messages. */
@@ -185,7 +181,6 @@ export type EngineEvent =
   | { type: "edit failed"; message: string; problem: { title: string; detail: string } | null }
   | { type: "unauthorized"; title: string; detail: string; hint: string | null }
   | { type: "limbs"; state: ClaimState }
-  | { type: "holding"; isHoldingAny: boolean }
   | { type: "toast"; message: string; ask: AskOffer | null }
   | { type: "limb notice"; text: string }
   | { type: "response"; id: number; result?: unknown; failure?: EngineFailure };

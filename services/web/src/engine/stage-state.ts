@@ -3,7 +3,7 @@ import type { StageState } from "./message";
 import type { FrameState, StageController } from "./stage-controller";
 
 /** Return the state of the stage after a frame. */
-export function describeStage({ stage, hands, pointer, velocity }: StageController, frame: FrameState): StageState {
+export function describeStage({ stage, pointer }: StageController, frame: FrameState): StageState {
   const hand = stage.nearerHand();
   return {
     hasPose: frame.pose !== null,
@@ -16,7 +16,5 @@ export function describeStage({ stage, hands, pointer, velocity }: StageControll
     followsMotionCamera: stage.followsMotionCamera,
     isPointerNear: pointer.hoveredLimb !== null,
     isPulling: pointer.isDragging,
-    selectedLimb: velocity.selectedLimb,
-    holdsLimb: hands.isHoldingAny,
   };
 }

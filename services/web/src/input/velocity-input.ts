@@ -142,6 +142,8 @@ export class VelocityInputs {
     const canRetry = !motion.needsRest && now - motion.triedAt >= CLAIM_RETRY_MS && this.#actions.isFree(limb);
     if (motion.isActive && this.#limbController.source(limb) === null && (isNewPush || canRetry)) {
       motion.triedAt = now;
+      // Before the claim, which reports the held limbs.
+      motion.isMomentary = true;
       motion.isMomentary = this.#actions.claim(limb);
     }
     if (this.#limbController.source(limb) !== "velocity") return;

@@ -7,15 +7,16 @@ test("Escape releases limbs only while one is held", () => {
   const sent: EngineCommand[] = [];
   const limbs = new LimbControls((command) => sent.push(command), recordPageActions([]));
   expect([limbs.releaseAll(), sent]).toEqual([false, []]);
-  limbs.update({ selectedLimb: null, holdsLimb: true });
+  limbs.update({ performer: 1, selectedLimb: null, holdsLimb: true });
   expect([limbs.releaseAll(), sent]).toEqual([true, [{ type: "release limbs" }]]);
+  expect(limbs.performer).toBe(1);
 });
 
 test("keys for the held limb apply once a limb is selected", () => {
   const sent: EngineCommand[] = [];
   const limbs = new LimbControls((command) => sent.push(command), recordPageActions([]));
   expect(limbs.commands.press("KeyW", ["held_y+"], 1, 0)).toBe(false);
-  limbs.update({ selectedLimb: 2, holdsLimb: true });
+  limbs.update({ performer: 0, selectedLimb: 2, holdsLimb: true });
   expect(limbs.commands.press("KeyW", ["held_y+"], 1, 0)).toBe(true);
   limbs.act("give");
   limbs.act("hold", 3);
