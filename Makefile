@@ -16,7 +16,7 @@ export PATH := $(CURDIR)/.tools/node:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE
 WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/v1 services/web/vite.config.ts services/web/vite.additional.ts services/web/vite.embed.config.ts services/web/vite.reference.config.ts services/web/compress-page.mjs proto/prior.json proto/constants.json -type f 2>/dev/null)
 
-.PHONY: demo-data simulate package pictures test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
+.PHONY: demo-data simulate package pictures test-webdriver test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
 
 help:
 	@echo "make demo    install everything, start the server and open the demo   (PORT=$(PORT) HOST=$(HOST) OPEN=$(OPEN))"
@@ -115,6 +115,10 @@ prior: .setup/python
 # measure the offset between sound and picture, in Chromium
 bench-audio: setup
 	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "clicks are heard in time"
+
+# test the page in Firefox and WebKitGTK: needs firefox-esr, webkit2gtk-driver and xvfb
+test-webdriver: setup
+	cd services/web && npx vitest run --config tests/webdriver/vitest.config.ts
 
 # take the pictures of README and docs from the running page
 pictures: setup

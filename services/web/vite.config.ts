@@ -73,7 +73,7 @@ export default defineConfig({
         extends: true,
         test: {
           name: "browser",
-          include: ["tests/browser/*.test.ts", "tests/webdriver/*.test.ts"],
+          include: ["tests/browser/*.test.ts"],
           globalSetup: "tests/browser/global-setup.ts",
           sequence: { groupOrder: 1 },
         },
