@@ -50,7 +50,12 @@ interface Drag {
   dy: number;
   /** Filter of the pull target. */
   filter: OneEuro;
-  /** Offset of the target from the handle towards the audience, in metres. */
+  /**
+   * Depth of the handle towards the audience, in metres: the mean of its present and its earlier depths. The handle
+   * follows the target a frame later, so that a target at exactly its depth would let it jump between two depths.
+   */
+  handleDepth: number;
+  /** Offset of the target from `handleDepth` towards the audience, in metres. */
   depthLead: number;
   /** Depth of the target towards the audience, in metres, and the time of its last update, in milliseconds. */
   depth: number;
@@ -92,9 +97,9 @@ export function createPointerInput(
   const pull = (drag: Drag, now: number) => {
     const { limb, x, y, dx, dy, filter } = drag;
     if (!stage.performers[performerOfLimb(limb)]) return;
-    handleAt(limb);
-    updateDepth(drag, now);
-    const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), drag.depthLead));
+    updateDepth(drag, handleAt(limb).dot(stage.back()), now);
+    const offset = drag.depth - handle.dot(stage.back());
+    const place = stage.fromScreen(x + dx, y + dy, handle.addScaledVector(stage.back(), offset));
     if (!place) return;
     const settings = smoothingSettings(smoothing(), PULL_BETA);
     if (settings) {
@@ -107,13 +112,13 @@ export function createPointerInput(
   /**
    * Move the target towards or away from the audience, starting at the handle; at rest the handle's own depth is kept.
    */
-  const updateDepth = (drag: Drag, now: number) => {
+  const updateDepth = (drag: Drag, handleDepth: number, now: number) => {
     const speed = depthInput(drag.limb) * DEPTH_SPEED_M_PER_S;
-    const depth = handle.dot(stage.back());
-    const startDepth = drag.depthLead === 0 ? depth : drag.depth;
-    drag.depth = startDepth + (speed * Math.max(now - drag.updatedAt, 0)) / 1000;
-    drag.depthLead = speed === 0 ? 0 : Math.min(MAX_DEPTH_LAG_M, Math.max(-MAX_DEPTH_LAG_M, drag.depth - depth));
-    drag.depth = depth + drag.depthLead;
+    drag.handleDepth = (drag.handleDepth + handleDepth) / 2;
+    const startDepth = drag.depthLead === 0 ? drag.handleDepth : drag.depth;
+    const depth = startDepth + (speed * Math.max(now - drag.updatedAt, 0)) / 1000;
+    drag.depthLead = speed === 0 ? 0 : Math.min(MAX_DEPTH_LAG_M, Math.max(-MAX_DEPTH_LAG_M, depth - drag.handleDepth));
+    drag.depth = drag.handleDepth + drag.depthLead;
     drag.updatedAt = now;
   };
 
@@ -131,6 +136,7 @@ export function createPointerInput(
     if (!limbController.claim(limb, "pointer")) return;
     onClaimed(limb);
     const at = stage.toScreen(handleAt(limb));
+    const depth = handle.dot(stage.back());
     drags.set(pointerId, {
       limb,
       x,
@@ -138,8 +144,9 @@ export function createPointerInput(
       dx: at.x - x,
       dy: at.y - y,
       filter: new OneEuro(3, { minCutoff: 1, beta: PULL_BETA, derivativeCutoff: 1 }),
+      handleDepth: depth,
       depthLead: 0,
-      depth: 0,
+      depth,
       updatedAt: now,
     });
   };
