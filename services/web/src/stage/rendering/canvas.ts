@@ -5,7 +5,8 @@ export type StageCanvas = HTMLCanvasElement | OffscreenCanvas;
 
 /** Create a canvas that is in no document. */
 export function createCanvas(width: number, height: number): StageCanvas {
-  if (typeof OffscreenCanvas !== "undefined") return new OffscreenCanvas(width, height);
+  // In a page an element, since some browsers offer WebGL on elements alone.
+  if (typeof document === "undefined") return new OffscreenCanvas(width, height);
   const canvas = document.createElement("canvas");
   [canvas.width, canvas.height] = [width, height];
   return canvas;
