@@ -1,6 +1,6 @@
 /** Work per frame, from traces. */
 import { expect, test } from "vitest";
-import { findDrawnFrames, sumMainThreadWork, type TraceEvent } from "./page/frame-trace";
+import { CALLBACK_EVENTS, findDrawnFrames, sumMainThreadWork, TASK_EVENTS, type TraceEvent } from "./page/frame-trace";
 
 const [MAIN, WORKER] = [1, 2];
 
@@ -10,20 +10,22 @@ function event(tid: number, name: string, startMs: number, durationMs?: number):
   return { name, pid: 1, tid, ts: 1000 * startMs, ...times };
 }
 
-test("main-thread work counts all tasks from a frame to the next", () => {
+test("main-thread work counts events from a frame to the next", () => {
   const events = [
     event(MAIN, "RunTask", 2, 2),
     event(MAIN, "RunTask", 9, 4),
     event(MAIN, "frame", 10),
     event(WORKER, "RunTask", 12, 20),
     event(MAIN, "RunTask", 14, 2),
+    event(MAIN, "HandlePostMessage", 14, 2),
     event(MAIN, "RunTask", 25, 4),
     event(MAIN, "frame", 26),
     event(MAIN, "RunTask", 41, 4),
     event(MAIN, "frame", 42),
   ];
   // The last frame is not followed by another.
-  expect(sumMainThreadWork(events)).toEqual([3, 2]);
+  expect(sumMainThreadWork(events, TASK_EVENTS)).toEqual([3, 2]);
+  expect(sumMainThreadWork(events, CALLBACK_EVENTS)).toEqual([1, 0]);
 });
 
 test("only callbacks of the engine's thread that drew are counted", () => {

@@ -8,8 +8,8 @@
  * - `line`: `first_paint_1mbit_s` is the same at 1 Mbit/s and 100 ms RTT, emulated by Chromium, WebSockets included.
  * - `frames`: cost of a frame with 4x CPU slowdown, full quality and three controlled limbs. All figures are thread time
  *   from Chromium's trace, which excludes waits for a processor and the GPU process. If the stage is drawn in a worker,
- *   `main_ms_p95` is the time of all tasks of the page's main thread from one of its animation frames to the next, with
- *   layout and painting, and `worker_ms_p95` is the worker's time for an animation frame callback that draws. Chromium
+ *   `main_ms_p95` is the time of the page's animation frame callbacks and of messages from one of its animation frames to
+ *   the next, without layout and painting, which are in a note, and `worker_ms_p95` is the worker's time for an animation frame callback that draws. Chromium
  *   slows only the main thread, so the worker's time is the measured one times 4. If the stage is drawn in the page,
  *   `main_ms_p95` is the time for an animation frame callback that draws, without layout and painting.
  * - `pointer`: `pointer_ms_p95` is the time from a movement of the mouse that drags a hand (the time stamp of its

@@ -4,11 +4,13 @@ import { engineOf, evaluateInEngine, installInRealms } from "../../browser/engin
 import { waitForFirstPose, waitForHold, waitForWelcome } from "../../browser/page-probe";
 import { type BenchContext, type BenchFigures, percentile, roundTo, withPage } from "./bench";
 import {
+  CALLBACK_EVENTS,
   DRAWN_MARK,
   FRAME_MARK,
   findDrawnFrames,
   sumMainThreadWork,
   TASK_CATEGORY,
+  TASK_EVENTS,
   TRACE_CATEGORIES,
   type TraceEvent,
 } from "./frame-trace";
@@ -56,10 +58,11 @@ function computePageFigures(bench: BenchContext, events: TraceEvent[]): BenchFig
 
 /** Compute the figures of an engine in a worker, whose times are scaled: Chromium slows only the page's main thread. */
 function computeThreadFigures(bench: BenchContext, events: TraceEvent[]): BenchFigures {
-  const main = sumMainThreadWork(events);
+  const main = sumMainThreadWork(events, CALLBACK_EVENTS);
+  const tasks = sumMainThreadWork(events, TASK_EVENTS);
   const { work, wall, callbackCount } = findDrawnFrames(events);
   const scaled = work.map((time) => time * CPU_SLOWDOWN);
-  bench.note(`frames: ${main.length} of the page; ${describe("main thread", main)}`);
+  bench.note(`frames: ${main.length} of the page; ${describe("callbacks", main)}; ${describe("all tasks", tasks)}`);
   bench.note(
     `frames: ${work.length} of ${callbackCount} of the worker drew; ${describe("worker", scaled)}, which is ` +
       `${CPU_SLOWDOWN} times the measured time; ${describe("wall clock as measured", wall)}`,

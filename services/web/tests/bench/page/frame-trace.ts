@@ -18,6 +18,10 @@ export const DRAWN_MARK = "drawn";
 export const TRACE_CATEGORIES = ["devtools.timeline", "blink.user_timing"];
 export const TASK_CATEGORY = "disabled-by-default-devtools.timeline";
 
+/** Events of the page's own work, callbacks and messages, and of all tasks, layout and painting included. */
+export const CALLBACK_EVENTS = ["FireAnimationFrame", "HandlePostMessage"];
+export const TASK_EVENTS = ["RunTask"];
+
 /** Durations in milliseconds: processor time and wall clock time of each animation frame callback that drew. */
 export interface DrawnFrames {
   callbackCount: number;
@@ -39,15 +43,15 @@ export function findDrawnFrames(events: readonly TraceEvent[]): DrawnFrames {
 }
 
 /**
- * Return the processor time in milliseconds of the page's main thread from each animation frame to the next: all tasks
- * that end between the two marks. The task of a frame ends after its mark, with layout and painting.
+ * Return the processor time in milliseconds of the page's main thread from each animation frame to the next: all events
+ * with these names that end between the two marks. The task of a frame ends after its mark.
  */
-export function sumMainThreadWork(events: readonly TraceEvent[]): number[] {
+export function sumMainThreadWork(events: readonly TraceEvent[], names: readonly string[]): number[] {
   const thread = threadOfMark(events, FRAME_MARK);
   const marks = thread.filter(({ name }) => name === FRAME_MARK).map(({ ts }) => ts);
   const work = Array<number>(Math.max(0, marks.length - 1)).fill(0);
   for (const { name, ts, dur = 0, tdur = 0 } of thread) {
-    const frame = name === "RunTask" ? marks.findLastIndex((at) => at <= ts + dur) : -1;
+    const frame = names.includes(name) ? marks.findLastIndex((at) => at <= ts + dur) : -1;
     if (frame >= 0 && frame < work.length) work[frame] += tdur / 1000;
   }
   return work;
