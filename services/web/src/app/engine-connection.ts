@@ -48,7 +48,7 @@ export class EngineConnection {
     const worker = realm === "worker" ? await this.#startWorker() : null;
     if (worker) this.#send = (command) => worker.postMessage(command);
     else if (!(await this.#startInPage())) {
-      this.onEvent({ type: "unavailable", reason: "not loaded" });
+      this.#fail();
       return;
     }
     const queue = this.#queue ?? [];
@@ -107,6 +107,17 @@ export class EngineConnection {
     this.#send = (command) => port1.postMessage(command);
     void engine.start();
     return true;
+  }
+
+  /** Report that there is no engine, drop what was sent to it, and reject all requests. */
+  #fail(): void {
+    this.#queue = null;
+    const failure = { known: null, message: "The engine of this page could not be loaded." };
+    this.#send = (command) => {
+      if (command.type === "request") this.#onEvent({ type: "response", id: command.id, failure });
+    };
+    for (const id of [...this.#pending.keys()]) this.#onEvent({ type: "response", id, failure });
+    this.onEvent({ type: "unavailable", reason: "not loaded" });
   }
 
   #onEvent(event: EngineEvent): void {

@@ -70,7 +70,7 @@ export class Engine {
     this.#claims = new ClaimController(
       {
         render: (state) => send({ type: "limbs", state }),
-        toast: (message, ask = undefined) => send({ type: "toast", message, ask: ask ?? null }),
+        toast: (message, ask) => send({ type: "toast", message, ask: ask ?? null }),
         notice: (text) => send({ type: "limb notice", text }),
       },
       () => this.#settings.mapping,

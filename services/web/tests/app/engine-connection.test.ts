@@ -105,3 +105,18 @@ test("the engine runs in the page if a worker is not wanted or not possible", as
   expect(FakeWorker.started).toEqual([]);
   await expect.poll(() => events.map(({ type }) => type)).toContain("unavailable");
 });
+
+test("requests fail, and later messages are dropped, if no engine can be loaded", async () => {
+  FakeWorker.first = null;
+  vi.doMock("../../src/engine/engine", () => {
+    throw new Error("not loaded");
+  });
+  const before = connection.request({ kind: "picture" });
+  const rejected = expect(before).rejects.toBeInstanceOf(EngineError);
+  await connection.start("worker");
+  await rejected;
+  expect(events).toEqual([{ type: "unavailable", reason: "not loaded" }]);
+  connection.post(toggleCamera);
+  await expect(connection.request({ kind: "camera keyframes" })).rejects.toBeInstanceOf(EngineError);
+  vi.doUnmock("../../src/engine/engine");
+});
