@@ -3,8 +3,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
+import sys
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import h11
@@ -281,6 +283,52 @@ async def test_body_in_tiny_chunks_is_parsed_in_turns(monkeypatch: pytest.Monkey
         connected.abort()
         connection.connection_lost(None)
     await asyncio.gather(*first.tasks, *second.tasks, return_exceptions=True)
+
+
+HEAD = b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 1000000\r\n\r\n"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel reports the size of its buffers on Linux")
+@pytest.mark.parametrize(
+    ("data", "reads_body", "is_enlarged"),
+    [
+        (HEAD + b"x" * 1_000, True, True),
+        (HEAD + b"x" * 1_000, False, False),
+        (b"GET / HTTP/1.1\r\nHost: a\r\n\r\n" * 20, True, False),
+    ],
+    ids=["body is read", "body is not read", "pipelined requests"],
+)
+async def test_receive_buffer_is_small_until_the_application_reads_a_body(
+    data: bytes, reads_body: bool, is_enlarged: bool
+) -> None:
+    async def app(_: object, receive: Callable[[], Awaitable[Any]], send: Callable[[Any], Awaitable[None]]) -> None:
+        if reads_body:
+            await receive()
+        await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"2")]})
+        await send({"type": "http.response.body", "body": b"ok"})
+
+    config = uvicorn.Config(app, lifespan="off", log_config=None)
+    config.load()
+    connections: list[HttpProtocol] = []
+
+    def accept() -> HttpProtocol:
+        connections.append(HttpProtocol(HttpLoad(), config, ServerState(), {}))
+        return connections[-1]
+
+    server = await asyncio.get_running_loop().create_server(accept, "127.0.0.1", 0)
+    async with server, asyncio.timeout(HANG_TIMEOUT_S):
+        reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+        writer.write(data)
+        for _ in range(data.count(b"Host")):
+            await reader.readuntil(b"ok")
+        accepted = connections[0].transport.get_extra_info("socket")
+        # the kernel reports twice the size
+        buffer_bytes = accepted.getsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF) // 2
+        connections[0].transport.abort()
+        await read_until_closed(reader)
+        writer.close()
+        await writer.wait_closed()
+    assert (buffer_bytes > protocol.RECEIVE_BUFFER_BYTES) == is_enlarged
 
 
 async def test_oldest_waiting_connection_makes_room_for_a_new_one(url: str, monkeypatch: pytest.MonkeyPatch) -> None:

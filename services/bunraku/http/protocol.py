@@ -35,7 +35,7 @@ grow to megabytes. It suffices for 1 MB/s at a round-trip time of 100 ms."""
 RECEIVE_BUFFER_BYTES = 16 << 10
 """Kernel receive buffer of a connection: no more arrives at once. A thousand connections may wait for their turns."""
 BODY_RECEIVE_BUFFER_BYTES = 256 << 10
-"""The same once the application reads a body, or a response without reading it is complete."""
+"""The same once the application reads a body."""
 PARSE_TIME_S = 1e-3
 """Time after which parsing of a connection's data pauses for other connections."""
 
@@ -71,14 +71,17 @@ class _ResponseTransport:
 
 
 class _BodyFlow(FlowControl):
-    """Flow control that receives faster once the application reads a body, for which it has to be permitted."""
+    """Flow control that receives faster once the application reads a body, which it does only if it is permitted."""
 
-    def __init__(self, transport: asyncio.Transport) -> None:
+    def __init__(self, transport: asyncio.Transport, connection: h11.Connection) -> None:
         super().__init__(transport)
+        self._connection = connection
         self._reads_body = False
 
     def resume_reading(self) -> None:
-        if self.read_paused and not self._reads_body:
+        """Read more from the client. Until the response is complete, the application waits for more of the body."""
+        is_body_awaited = self._connection.their_state is h11.SEND_BODY and self._connection.our_state is not h11.DONE
+        if is_body_awaited and not self._reads_body:
             self._reads_body = True
             set_receive_buffer(self._transport, BODY_RECEIVE_BUFFER_BYTES)
         super().resume_reading()
@@ -118,7 +121,7 @@ class HttpProtocol(H11Protocol):
         transport.set_write_buffer_limits(0, 0)
         set_send_buffer(transport, SEND_BUFFER_BYTES)
         set_receive_buffer(transport, RECEIVE_BUFFER_BYTES)
-        self.flow = _BodyFlow(transport)
+        self.flow = _BodyFlow(transport, self.conn)
         self._write_deadline = WriteDeadline(transport)
         self._start_timeout()
 
