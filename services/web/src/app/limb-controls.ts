@@ -32,9 +32,10 @@ export class LimbControls {
     this.send({ type: "performer", performer });
   }
 
-  /** Release all limbs held by keys, gamepad or buttons. Return whether any limb was held. */
+  /** Release all limbs held by keys, gamepad or buttons. Return whether the page knows of any. */
   releaseAll(): boolean {
-    if (this.#holdsLimb) this.send({ type: "release limbs" });
+    // Sent in any case: the engine may have claimed a limb that it has not reported yet.
+    this.send({ type: "release limbs" });
     return this.#holdsLimb;
   }
 
