@@ -104,7 +104,7 @@ async def pings_on_control_without_reading(target: Target, report: Report) -> No
 @attack(4, f"{CALM}; output bounded, aborted after a write deadline", seconds=MAX_WRITE_DEADLINE_S)
 async def clock_pings_on_control_without_reading(target: Target, report: Report) -> None:
     """Send clock messages at the permitted rate on eight control connections and never read the answers."""
-    data = frame(BINARY, Ping(1, 2).pack()) * 30
+    data = frame(BINARY, Ping(1, 2).pack()) * 60
 
     async def run() -> None:
         opened = await connect_websocket(target, target.control, target.tokens["control"], receive_buffer_bytes=4_096)
