@@ -1,5 +1,4 @@
 /** Invitation to take a hand, shown on a first visit beside the hand nearer to the audience. */
-import type { ScreenPosition } from "../stage/camera/screen-projection";
 import { browserStorage, type WebStorage } from "../storage/web-storage";
 import type { NameTags } from "../ui/strings/name-tag";
 
@@ -8,7 +7,7 @@ const INVITATION_DURATION_MS = 6_000;
 
 export class Invitation {
   #finished: boolean;
-  #startedAtMs: number | null = null;
+  #timer: ReturnType<typeof setTimeout> | undefined;
 
   constructor(
     private readonly tags: Pick<NameTags, "invite">,
@@ -17,22 +16,19 @@ export class Invitation {
     this.#finished = storage.get(INVITATION_SHOWN_KEY) !== null;
   }
 
-  /** Show the invitation beside `hand` at local time `now` in milliseconds, or end it after its duration. */
-  update(now: number, hand: ScreenPosition | null): void {
-    if (this.#finished) return;
-    this.#startedAtMs ??= now;
-    if (now - this.#startedAtMs > INVITATION_DURATION_MS) {
-      this.finish();
-      return;
-    }
-    this.tags.invite(hand);
+  /** Show the invitation for its duration. Called once there is a hand to take. */
+  start(): void {
+    if (this.#finished || this.#timer !== undefined) return;
+    this.#timer = setTimeout(() => this.finish(), INVITATION_DURATION_MS);
+    this.tags.invite(true);
   }
 
   /** Hide the invitation, and never show it again in this browser. */
   finish(): void {
     if (this.#finished) return;
     this.#finished = true;
-    this.tags.invite(null);
+    clearTimeout(this.#timer);
+    this.tags.invite(false);
     this.storage.put(INVITATION_SHOWN_KEY, "yes");
   }
 }

@@ -2,22 +2,25 @@
 import { AvatarError } from "../avatar/error";
 import type { CameraKeyframe } from "../client/api";
 import type { ClaimState } from "../engine/claim-controller";
-import type { EngineEvent, EngineSettings, StageState } from "../engine/message";
+import type { EngineEvent, EngineSettings } from "../engine/message";
 import { translate } from "../i18n/translator";
-import { createGamepadInput, type GamepadInput } from "../input/gamepad";
+import { createGamepadInput } from "../input/gamepad";
 import { listenToKeyboard } from "../input/keyboard";
 import type { Mapping } from "../input/mapping";
 import { listenToMouse } from "../input/mouse";
-import { listenToPointer, showPointerState } from "../input/pointer-events";
+import { listenToPointer } from "../input/pointer-events";
 import { LIMBS } from "../motion/skeleton";
 import type { Theme } from "../stage/scenery/look";
 import type { Page } from "../ui/page";
 import { LANDSCAPE_PHONE, PHONE } from "../ui/panel";
+import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
 import { type EngineConnection, EngineError, type EngineRealm } from "./engine-connection";
+import { GamepadPolling } from "./gamepad-polling";
 import type { Invitation } from "./invitation";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
+import { StageOverlay } from "./stage-overlay";
 import type { StartupSequence } from "./startup";
 
 /** Limbs of one performer before the engine has reported any. */
@@ -45,11 +48,18 @@ export interface StageHostOptions {
 }
 
 export class StageHost {
-  #gamepad: GamepadInput | null = null;
-  #state: StageState | null = null;
+  readonly #overlay: StageOverlay;
+  readonly #gamepad: GamepadPolling;
   #isReady = false;
 
-  constructor(private readonly options: StageHostOptions) {}
+  constructor(private readonly options: StageHostOptions) {
+    const { canvas, page, limbs, getMapping } = options;
+    this.#overlay = new StageOverlay(canvas, page, () => options.getPlayback().current);
+    this.#gamepad = new GamepadPolling(
+      createGamepadInput(limbs.commands, getMapping, () => navigator.getGamepads()),
+      page.mappingDialog,
+    );
+  }
 
   /** Start the engine and pass the inputs to it. */
   async open(realm: EngineRealm): Promise<void> {
@@ -73,6 +83,16 @@ export class StageHost {
 
   setMapping(mapping: Mapping): void {
     this.#setSettings({ mapping });
+  }
+
+  /** Set the sizes of the labels over the stage, and the space for them. */
+  setLabels(labels: LabelMetrics): void {
+    this.#setSettings({ labels });
+  }
+
+  /** Poll the gamepad while the dialog of keys and gamepad is open. */
+  pollGamepad(): void {
+    this.#gamepad.start();
   }
 
   /** Follow the motion's own camera, or return to the audience's view. */
@@ -128,27 +148,31 @@ export class StageHost {
 
   /** Handle an event of the engine. */
   onEvent(event: EngineEvent): void {
-    const { limbs, page } = this.options;
+    const { invitation, limbs, page, startup, viewOnly } = this.options;
     const playback = this.options.getPlayback();
     switch (event.type) {
       case "ready":
         this.#isReady = true;
-        this.options.startup.onStageReady();
-        requestAnimationFrame(() => this.#renderFrame());
+        startup.onStageReady();
         break;
       case "unavailable":
         this.#showUnavailable(event.reason);
         break;
       case "frame":
         playback.onTime(event.playback, event.time);
-        if (event.state) this.#setState(event.state);
+        this.#overlay.update(event.changes);
+        if (event.changes?.hasPose && !viewOnly) invitation.start();
+        if (event.changes?.hasDrawnPerformer) startup.finish();
         break;
       case "playback":
         playback.onChange(event.playback, event.change);
+        this.#overlay.update();
         break;
       case "statistics": {
         const { current } = playback;
         playback.onTime(event.playback, event.time);
+        // The sound goes on while the stage stands still and sends no frames.
+        current?.sendLead(performance.now());
         // Statistics begin when the stage is drawn.
         if (current?.number !== event.playback || !this.#isReady) break;
         page.link.addSample(event.statistics, current.levelCount);
@@ -188,21 +212,14 @@ export class StageHost {
     const { limbs, isReady, performer, giveKey } = state;
     this.options.limbs.update(state);
     if (state.holdsLimb) invitation.finish();
+    page.nameTags.setLimbs(limbs);
     page.strings.render(limbs, isReady, performer);
     page.limbRequests.render(limbs, giveKey);
     page.library.danceAs.dancers(limbs, performer);
   }
 
-  #setState(state: StageState): void {
-    const { canvas, page, startup } = this.options;
-    this.#state = state;
-    showPointerState(canvas, state);
-    page.transport.setCamera(state.hasMotionCamera, state.followsMotionCamera);
-    if (state.hasDrawnPerformer) startup.finish();
-  }
-
   #listenToInputs(): void {
-    const { canvas, engine, limbs, page, getMapping } = this.options;
+    const { canvas, engine, limbs, page, startup, getMapping } = this.options;
     const { commands } = limbs;
     listenToKeyboard(window, commands, limbs, getMapping, {
       showKeys: () => page.mappingDialog.show(),
@@ -210,7 +227,10 @@ export class StageHost {
     });
     listenToMouse(canvas, window, commands, getMapping);
     listenToPointer(canvas, (event) => engine.post({ type: "pointer", event }));
-    this.#gamepad = createGamepadInput(commands, getMapping, () => navigator.getGamepads());
+    startup.runWhenFinished(() => {
+      addEventListener("gamepadconnected", () => this.#gamepad.start());
+      this.#gamepad.start();
+    });
     // A page in the background draws no frames, so nothing would release the inputs that were pressed.
     document.addEventListener("visibilitychange", () => {
       this.#setSettings({ isHidden: document.hidden });
@@ -239,30 +259,5 @@ export class StageHost {
         ? translate("It needs WebGL 2. Try another browser, or switch on hardware acceleration.")
         : translate("The renderer could not be loaded. Check your connection, then reload this page."),
     );
-  }
-
-  /** Update the elements over the stage, which move with it. */
-  #renderFrame(): void {
-    requestAnimationFrame(() => this.#renderFrame());
-    const { invitation, limbs, page, viewOnly } = this.options;
-    const now = performance.now();
-    this.#updateGamepad(now);
-    const state = this.#state;
-    if (state) {
-      page.nameTags.render(state.limbs, state.bars, state.faces, now, limbs.performer);
-      page.messageArea.avoidFaces(state.faces);
-      if (state.hasPose && !viewOnly) invitation.update(now, state.nearerHand);
-    }
-    const { current } = this.options.getPlayback();
-    if (!current) return;
-    page.transport.setPosition(current.position, current.duration);
-    current.sendLead(now);
-  }
-
-  #updateGamepad(now: number): void {
-    const { mappingDialog } = this.options.page;
-    // Browsers start to look for gamepads when they are first polled.
-    if (this.#state?.hasDrawnPerformer || mappingDialog.isOpen) this.#gamepad?.update(now, !mappingDialog.isCapturing);
-    if (mappingDialog.isOpen) mappingDialog.updateGamepad(this.#gamepad?.pad ?? null);
   }
 }

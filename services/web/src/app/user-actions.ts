@@ -78,6 +78,8 @@ export function createUserActions(app: AppParts): UserActions {
     dancer: (performer) => app.limbs.selectPerformer(performer),
     nextDancer: () => app.limbs.selectPerformer("next"),
     reframe: () => app.stageHost.resize(),
+    labels: (metrics) => app.stageHost.setLabels(metrics),
+    mappingShown: () => app.stageHost.pollGamepad(),
     ...(pageAccess.allows("ingest") ? { keep: createPageRecordAction(app) } : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {

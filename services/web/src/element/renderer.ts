@@ -156,13 +156,9 @@ export class ElementRenderer {
     const now = performance.now();
     const { pose, limbs } = stageController.draw(now, this.focusedLimb);
     const { stage } = stageController;
-    this.view.nameTags.render(
-      limbs,
-      pose ? limbs.map((_, limb) => stage.barBox(limb)) : [],
-      stage.faceBoxes,
-      now,
-      this.limbController.selectedPerformer.performer,
-    );
+    const bars = pose ? limbs.map((_, limb) => stage.barBox(limb)) : [];
+    const anchors = { limbs, bars, faces: stage.faceBoxes, hand: null };
+    this.view.placeNameTags(anchors, stageController.selectedPerformer, now);
     this.#playback?.viewer.recordFrame(performance.now() - now);
     if (!pose || this.#firstPoseReported) return;
     this.#firstPoseReported = true;

@@ -5,8 +5,9 @@ import { element, setAttribute } from "../ui/dom";
 import { icon, limbIcon } from "../ui/icon";
 import { LIMB_ORDER, type LimbState, limbKey, limbName, performerCount } from "../ui/limb-state";
 import { createToast, type ToastController } from "../ui/notification/toast";
+import { type LabelAnchors, LabelLayout } from "../ui/strings/label-layout";
 import { createLimbRequests, type LimbRequests } from "../ui/strings/limb-request";
-import { createNameTags, type NameTags } from "../ui/strings/name-tag";
+import { createNameTags } from "../ui/strings/name-tag";
 import { createNextPerformerButton } from "../ui/strings/performer-chooser";
 import { createSoundButton } from "../ui/transport/sound-control";
 import { limbNumber } from "../wire/limbs";
@@ -29,7 +30,6 @@ export interface ElementView {
   /** Container that receives key events: canvas, buttons and everything inside them. */
   readonly frame: HTMLElement;
   readonly canvas: HTMLCanvasElement;
-  readonly nameTags: NameTags;
   readonly limbRequests: LimbRequests;
   readonly toast: ToastController;
   readonly soundButton: HTMLElement;
@@ -41,6 +41,8 @@ export interface ElementView {
   setSound(available: boolean, audible: boolean): void;
   /** Show the limbs of the `selected` performer. `canClaim` shows their buttons, `ready` enables them. */
   renderLimbs(limbs: readonly LimbState[], canClaim: boolean, ready: boolean, selected?: number): void;
+  /** Place the name tags; `selected` is the performer whose tags are placed first, and `now` is in milliseconds. */
+  placeNameTags(anchors: LabelAnchors, selected: number, now: number): void;
   remove(): void;
 }
 
@@ -73,7 +75,11 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
   });
   const frame = element("div", { class: "frame", part: "frame", lang: translator.language, tabindex: -1 }, canvas);
   root.append(frame);
-  const nameTags = createNameTags(frame, actions.ask, { top: TAG_TOP_MARGIN_PX, translator });
+  const labels = new LabelLayout();
+  const nameTags = createNameTags(frame, actions.ask, (metrics) => (labels.metrics = metrics), {
+    top: TAG_TOP_MARGIN_PX,
+    translator,
+  });
   const notice = element("div", { class: "notice", part: "notice", role: "status", hidden: true });
   const messages = element("div", { class: "messages" });
   frame.append(notice, messages);
@@ -118,7 +124,6 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
   return {
     frame,
     canvas,
-    nameTags,
     limbRequests,
     toast,
     soundButton: sound.element,
@@ -142,6 +147,7 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
     },
     renderLimbs(limbs, canClaim, ready, selected = 0) {
       performer = selected;
+      nameTags.setLimbs(limbs);
       next.render(canClaim ? limbs : [], selected);
       for (const { limb, disc } of discs) {
         const number = limbNumber(selected, limb);
@@ -165,6 +171,7 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
       }
       updateCount();
     },
+    placeNameTags: (...anchors) => nameTags.place(labels.update(...anchors)),
     remove() {
       frame.remove();
     },

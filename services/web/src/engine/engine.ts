@@ -9,7 +9,9 @@ import type { PageActions } from "../input/command-dispatcher";
 import { ACTIONS, DEFAULT_MAPPING } from "../input/mapping";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import { type Graphics, openGraphics } from "../stage/rendering/graphics";
+import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
 import { AvatarModels } from "./avatar-models";
+import { changedParts } from "./changed-parts";
 import { ClaimController } from "./claim-controller";
 import type {
   EngineCommand,
@@ -21,6 +23,7 @@ import type {
   EngineSettings,
   LimbAction,
   PlaybackRequest,
+  StageState,
   ViewerTime,
 } from "./message";
 import { Playback } from "./playback";
@@ -40,6 +43,7 @@ const INITIAL_SETTINGS: EngineSettings = {
   focusedLimb: null,
   isHidden: false,
   viewport: { width: 1, height: 1, framing: "desktop", pixelRatio: 1, sideInsets: [0, 0], bottomInset: 0 },
+  labels: NO_LABELS,
 };
 
 export class Engine {
@@ -47,6 +51,7 @@ export class Engine {
   readonly #access: Access;
   readonly #claims: ClaimController;
   readonly #avatars = new AvatarModels();
+  readonly #labels = new LabelLayout();
   /** Add this to a time of the page's clock for the time of this realm's. */
   readonly #clockShiftMs: number;
   #controller: StageController | null = null;
@@ -55,7 +60,7 @@ export class Engine {
   #playbackNumber = 0;
   readonly #statisticsTimer: ReturnType<typeof setInterval>;
   #isClosed = false;
-  #lastState = "";
+  #lastState: StageState | null = null;
   #lastPosition = NaN;
 
   /** Call `start` once afterwards. Events are sent by `send`. */
@@ -191,8 +196,9 @@ export class Engine {
     this.#exposeDebugHandle();
   }
 
-  #applySettings({ theme, reducedMotion, mapping, viewport }: Partial<EngineSettings>): void {
+  #applySettings({ theme, reducedMotion, mapping, viewport, labels }: Partial<EngineSettings>): void {
     if (mapping) this.#claims.render();
+    if (labels) this.#labels.metrics = labels;
     const stage = this.#controller?.stage;
     if (!stage) return;
     if (theme) stage.setTheme(theme);
@@ -258,18 +264,14 @@ export class Engine {
     const controller = this.#controller;
     if (!controller || !this.#describeStage) return;
     const now = performance.now();
-    const state = this.#describeStage(controller, controller.draw(now, this.#settings.focusedLimb));
+    const frame = controller.draw(now, this.#settings.focusedLimb);
+    const state = this.#describeStage(controller, frame, this.#labels, now);
+    const changes = changedParts(this.#lastState, state);
     const time = this.#viewerTime(now);
-    const described = JSON.stringify(state);
-    if (described !== this.#lastState || (time?.position ?? NaN) !== this.#lastPosition)
-      this.send({
-        type: "frame",
-        state: described === this.#lastState ? null : state,
-        playback: this.#playbackNumber,
-        time,
-      });
-    this.#lastState = described;
-    this.#lastPosition = time?.position ?? NaN;
+    const position = time?.position ?? NaN;
+    if (changes || !Object.is(position, this.#lastPosition))
+      this.send({ type: "frame", changes, playback: this.#playbackNumber, time });
+    [this.#lastState, this.#lastPosition] = [state, position];
     this.#playback?.viewer.recordFrame(performance.now() - now);
   }
 

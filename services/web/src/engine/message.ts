@@ -11,9 +11,8 @@ import type { CommandMessage } from "../input/remote-commands";
 import type { LeaderTime } from "../playout/presentation-clock";
 import type { Framing } from "../stage/camera/audience-camera";
 import type { ScreenBox } from "../stage/camera/screen-box";
-import type { ScreenPosition } from "../stage/camera/screen-projection";
 import type { Theme } from "../stage/scenery/look";
-import type { LimbState } from "../ui/limb-state";
+import type { LabelMetrics, LabelPositions } from "../ui/strings/label-layout";
 import type { Presence, TimelineState } from "../wire/messages";
 import type { AskOffer, ClaimState } from "./claim-controller";
 import type { PlaybackKind } from "./playback";
@@ -40,6 +39,8 @@ export interface EngineSettings {
   /** True while the page is in the background. */
   isHidden: boolean;
   viewport: Viewport;
+  /** Sizes of the labels over the stage, and the space for them. */
+  labels: LabelMetrics;
 }
 
 /** Size of the canvas, and the parts of it that panels cover. */
@@ -111,12 +112,9 @@ export interface StageState {
   readonly hasPose: boolean;
   /** True if a frame with a performer is on the screen. */
   readonly hasDrawnPerformer: boolean;
-  readonly limbs: readonly LimbState[];
-  /** Control bars by limb number, null for those that are not on the stage. */
-  readonly bars: readonly (ScreenBox | null)[];
+  readonly labels: LabelPositions;
+  /** Boxes of the faces, in whole pixels. */
   readonly faces: readonly ScreenBox[];
-  /** The hand nearer to the audience, for the invitation. */
-  readonly nearerHand: ScreenPosition | null;
   readonly hasMotionCamera: boolean;
   readonly followsMotionCamera: boolean;
   /** True if the pointer is over a handle, or drags one. */
@@ -167,8 +165,8 @@ export type EngineEvent =
   | { type: "ready" }
   /** There will be no stage. */
   | { type: "unavailable"; reason: "graphics" | "not loaded" }
-  /** A frame: the stage, null if it has not changed, and the time of the playback, null before it is known. */
-  | { type: "frame"; state: StageState | null; playback: number; time: ViewerTime | null }
+  /** A frame: what has changed on the stage, and the time of the playback, null before it is known. */
+  | { type: "frame"; changes: Partial<StageState> | null; playback: number; time: ViewerTime | null }
   | { type: "graphics"; isLost: boolean }
   | { type: "playback"; playback: number; change: PlaybackChange }
   | {

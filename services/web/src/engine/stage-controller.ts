@@ -79,6 +79,11 @@ export class StageController {
     };
   }
 
+  /** Performer whose limbs keys, gamepad and page controls act on. */
+  get selectedPerformer(): number {
+    return this.limbController.selectedPerformer.performer;
+  }
+
   /** Show another playback. With null, the last performers stay on the stage and stand still. */
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;

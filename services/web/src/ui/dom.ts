@@ -21,12 +21,16 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return created;
 }
 
-/** Set an attribute, or remove it if the value is `false`, `null` or `undefined`. */
+/**
+ * Set an attribute, or remove it if the value is `false`, `null` or `undefined`. An unchanged value is not written again:
+ * that would cost a style calculation.
+ */
 export function setAttribute(target: Element, name: string, value: string | number | boolean | null | undefined): void {
+  const text = value === true ? "" : String(value);
   if (value === false || value === null || value === undefined) target.removeAttribute(name);
   // A style set by script is allowed under any content security policy of the embedding page.
-  else if (name === "style") (target as HTMLElement).style.cssText = String(value);
-  else target.setAttribute(name, value === true ? "" : String(value));
+  else if (name === "style") (target as HTMLElement).style.cssText = text;
+  else if (target.getAttribute(name) !== text) target.setAttribute(name, text);
 }
 
 const SVG = "http://www.w3.org/2000/svg";

@@ -14,6 +14,7 @@ import { createNotice, type ShowNotice } from "./notification/notice";
 import { createToast, type ToastController } from "./notification/toast";
 import { createOccupiedArea } from "./occupied-area";
 import { createPanels, type Panels, PHONE } from "./panel";
+import type { LabelMetrics } from "./strings/label-layout";
 import { createLimbRequests, type LimbRequests } from "./strings/limb-request";
 import { createNameTags, type NameTags } from "./strings/name-tag";
 import { createStringsPanel, type StringsActions, type StringsPanel } from "./strings/strings-panel";
@@ -43,6 +44,10 @@ export interface UserActions extends StringsActions, SoundActions, AvatarActions
   mapping(mapping: Mapping): void;
   /** Called when a panel opened, closed or changed its size: the stage may need another framing. */
   reframe(): void;
+  /** Called when the sizes of the labels over the stage, or the space for them, have changed. */
+  labels(metrics: LabelMetrics): void;
+  /** Called when the dialog of keys and gamepad was opened. */
+  mappingShown(): void;
 }
 
 export interface Page {
@@ -62,9 +67,9 @@ export interface Page {
 
 /** Create the user interface in `root`. */
 export function createPage(root: HTMLElement, actions: UserActions): Page {
-  const nameTags = createNameTags(root, actions.ask, { getObstacles: () => occupied.boxes });
+  const nameTags = createNameTags(root, actions.ask, actions.labels);
   const { element: noticeElement, notice } = createNotice(root);
-  const mappingDialog = createLazyMappingDialog(root, actions.mapping, () =>
+  const mappingDialog = createLazyMappingDialog(root, actions.mapping, actions.mappingShown, () =>
     toast(translate("The key settings could not be loaded. Check your connection, then try again")),
   );
   const header = createHeader(root, {
@@ -99,14 +104,17 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     },
     actions.reframe,
   );
-  const occupied = createOccupiedArea([
-    ...header.parts,
-    ...transport.parts,
-    strings.dock,
-    ...strings.dock.querySelectorAll("span"),
-    ...elements.values(),
-    messageArea.element,
-  ]);
+  const occupied = createOccupiedArea(
+    [
+      ...header.parts,
+      ...transport.parts,
+      strings.dock,
+      ...strings.dock.querySelectorAll("span"),
+      ...elements.values(),
+      messageArea.element,
+    ],
+    nameTags.setObstacles,
+  );
   PHONE.addEventListener("change", () => {
     while (panels.closeLast());
     actions.reframe();

@@ -1,28 +1,33 @@
-import { expect, test } from "vitest";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Invitation } from "../../src/app/invitation";
 
+beforeEach(() => void vi.useFakeTimers());
+afterEach(() => void vi.useRealTimers());
+
 function createInvitation(stored: Record<string, string> = {}) {
-  const shown: ({ x: number; y: number } | null)[] = [];
+  const shown: boolean[] = [];
   const storage = {
     get: (key: string) => stored[key] ?? null,
     put: (key: string, text: string) => void (stored[key] = text),
   };
-  const invitation = new Invitation({ invite: (point) => void shown.push(point) }, storage);
+  const invitation = new Invitation({ invite: (isInvited) => void shown.push(isInvited) }, storage);
   return { invitation, shown, stored };
 }
 
-const HAND = { x: 100, y: 200 };
-
-test("invitation is shown beside the nearer hand for six seconds, once", () => {
+test("invitation is shown for six seconds, once", () => {
   const { invitation, shown, stored } = createInvitation();
-  invitation.update(50_000, HAND);
-  invitation.update(56_000, HAND);
-  expect(shown).toEqual([HAND, HAND]);
-  invitation.update(56_001, HAND);
-  invitation.update(56_020, HAND);
-  expect(shown.slice(2)).toEqual([null]);
+  invitation.start();
+  vi.advanceTimersByTime(3_000);
+  invitation.start();
+  vi.advanceTimersByTime(2_999);
+  expect(shown).toEqual([true]);
+  vi.advanceTimersByTime(1);
+  expect(shown).toEqual([true, false]);
+  invitation.start();
+  vi.advanceTimersByTime(10_000);
+  expect(shown).toEqual([true, false]);
   const next = createInvitation(stored);
-  next.invitation.update(0, HAND);
+  next.invitation.start();
   expect(next.shown).toEqual([]);
 });
 
@@ -30,13 +35,16 @@ test("invitation ends when a limb is claimed, even before it was shown", () => {
   const { invitation, shown, stored } = createInvitation();
   invitation.finish();
   invitation.finish();
-  invitation.update(0, HAND);
-  expect(shown).toEqual([null]);
+  invitation.start();
+  vi.advanceTimersByTime(10_000);
+  expect(shown).toEqual([false]);
   expect(Object.values(stored)).toEqual(["yes"]);
 });
 
-test("invitation is hidden without a visible hand", () => {
+test("a limb that is claimed while the invitation is shown ends it at once", () => {
   const { invitation, shown } = createInvitation();
-  invitation.update(0, null);
-  expect(shown).toEqual([null]);
+  invitation.start();
+  invitation.finish();
+  vi.advanceTimersByTime(10_000);
+  expect(shown).toEqual([true, false]);
 });

@@ -2,7 +2,7 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
-import { engineOf, engineWorker, evaluateInEngine } from "./engine-probe";
+import { engineOf, engineWorker, evaluateInEngine, waitForFrames } from "./engine-probe";
 import {
   jointPosition,
   LEFT_HAND,
@@ -18,6 +18,8 @@ import {
 
 /** Least movement of a pulled hand, in metres. */
 const MIN_MOVEMENT_M = 0.1;
+/** Frames of the engine, times two, in which a still stage is observed. */
+const STILL_FRAMES = 10;
 
 describeInBrowser("engine", { server: "open" }, ({ open }) => {
   /** Pull the left hand by the mouse, then hold it by its key. */
@@ -47,6 +49,33 @@ describeInBrowser("engine", { server: "open" }, ({ open }) => {
     expect(await page.evaluate(() => Object.keys(globalThis.bunraku))).toEqual(["listening"]);
     expect(await evaluateInEngine(page, () => "document" in globalThis)).toBe(false);
     await pullHand(page);
+  });
+
+  test("a page whose stage stands still requests no frames", async () => {
+    const page = await open();
+    await waitForFirstPose(page);
+    await waitForWelcome(page);
+    await pauseAtStart(page);
+    await page.locator(".invitation").waitFor({ state: "hidden" });
+    await page.evaluate(() => {
+      const request = requestAnimationFrame.bind(window);
+      document.documentElement.dataset["requests"] = "0";
+      window.requestAnimationFrame = (callback) => {
+        document.documentElement.dataset["requests"] = String(Number(document.documentElement.dataset["requests"]) + 1);
+        return request(callback);
+      };
+    });
+    const requestCount = () => page.evaluate(() => Number(document.documentElement.dataset["requests"]));
+    const worker = await engineOf(page);
+    const countInFrames = async () => {
+      const before = await requestCount();
+      for (let frame = 0; frame < STILL_FRAMES; frame++) await waitForFrames(worker);
+      return (await requestCount()) - before;
+    };
+    // The camera and the puppet's cloth come to rest after the pause.
+    await expect.poll(countInFrames).toBe(0);
+    await page.getByRole("button", { name: "Play", exact: true }).click();
+    await expect.poll(requestCount).toBeGreaterThan(0);
   });
 
   test("it runs in the page where a canvas cannot be given to a worker", async () => {

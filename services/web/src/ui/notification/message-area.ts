@@ -4,7 +4,7 @@ import { element, setAttribute } from "../dom";
 
 export interface MessageArea {
   readonly element: HTMLElement;
-  /** Keep clear of the performers' faces, given as CSS pixel boxes. Call this every frame. */
+  /** Keep clear of the performers' faces, given as CSS pixel boxes. Call this whenever they have moved. */
   avoidFaces(faces: readonly ScreenBox[]): void;
 }
 

@@ -9,6 +9,12 @@ const QUALITY_NAMES = ["lowest detail", "low detail", "good detail", "full detai
 const HEAD_STEPS = 1000;
 const MAX_CELLS = { desktop: 68, phone: 44 };
 
+/** Element of a cell, and the quality that it shows. */
+interface Mark {
+  readonly element: HTMLElement;
+  quality: number;
+}
+
 export interface SeekBar {
   readonly element: HTMLElement;
   setBlocks(blocks: ArrayLike<number>, levelCount: number): void;
@@ -27,11 +33,11 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
     "aria-valuemin": 0,
     "aria-valuenow": 0,
   });
+  bar.append(head, hint);
   let cells: SeekCell[] = [];
-  let marks: HTMLElement[] = [];
+  const marks: Mark[] = [];
   let blockLevels: ArrayLike<number> = [];
   let [position, length] = [0, 0];
-  let shownQualities = "";
   let shownHeadPlace = 0;
 
   const secondsAt = (event: PointerEvent) => {
@@ -82,22 +88,20 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
 
   const markPlayed = () => {
     const fraction = length > 0 ? position / length : 0;
-    cells.forEach((cell, i) => marks[i].classList.toggle("played", cell.quality >= 0 && cell.start < fraction));
+    cells.forEach((cell, i) => marks[i].element.classList.toggle("played", cell.quality >= 0 && cell.start < fraction));
   };
   return {
     element: bar,
     setBlocks(blocks, levelCount) {
       blockLevels = blocks;
       cells = seekCells(blocks, levelCount, innerWidth <= 720 ? MAX_CELLS.phone : MAX_CELLS.desktop);
-      const qualities = cells.map((cell) => cell.quality).join();
-      if (qualities === shownQualities) return;
-      shownQualities = qualities;
-      marks = cells.map(({ quality }) =>
-        quality < 0
-          ? element("i", { class: "missing" })
-          : element("i", { style: `--quality:${quality};--cell:var(--quality-${quality})` }),
-      );
-      bar.replaceChildren(...marks, head, hint);
+      while (marks.length > cells.length) marks.pop()?.element.remove();
+      while (marks.length < cells.length) {
+        const mark = { element: element("i"), quality: Number.NaN };
+        marks.push(mark);
+        head.before(mark.element);
+      }
+      cells.forEach(({ quality }, i) => showQuality(marks[i], quality));
       markPlayed();
     },
     setPosition(seconds, duration) {
@@ -124,4 +128,12 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
       setAttribute(bar, "aria-disabled", duration > 0 ? null : "true");
     },
   };
+}
+
+/** Show the quality of a cell. An unchanged one is not written again: most blocks change one cell only. */
+function showQuality(mark: Mark, quality: number): void {
+  if (mark.quality === quality) return;
+  mark.quality = quality;
+  mark.element.classList.toggle("missing", quality < 0);
+  setAttribute(mark.element, "style", quality < 0 ? null : `--quality:${quality};--cell:var(--quality-${quality})`);
 }
