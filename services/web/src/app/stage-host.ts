@@ -14,7 +14,7 @@ import type { Theme } from "../stage/scenery/look";
 import type { Page } from "../ui/page";
 import { LANDSCAPE_PHONE, PHONE } from "../ui/panel";
 import type { StagedAvatars } from "./avatar-slot";
-import { type EngineConnection, EngineError, type EngineRealm } from "./engine-connection";
+import { type EngineConnection, EngineError } from "./engine-connection";
 import type { Invitation } from "./invitation";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
@@ -51,8 +51,8 @@ export class StageHost {
 
   constructor(private readonly options: StageHostOptions) {}
 
-  /** Start the engine and pass the inputs to it. */
-  async open(realm: EngineRealm): Promise<void> {
+  /** Start the engine, in the worker if there is one, and pass the inputs to it. */
+  async open(worker: Promise<Worker | null>): Promise<void> {
     const { engine, reducedMotion } = this.options;
     this.#setSettings({
       reducedMotion: reducedMotion.matches,
@@ -64,7 +64,7 @@ export class StageHost {
     this.resize();
     addEventListener("resize", () => this.resize());
     this.#listenToInputs();
-    await engine.start(realm);
+    await engine.start(await worker);
   }
 
   setTheme(theme: Theme): void {

@@ -1,4 +1,4 @@
-/** Worker that hosts the engine of a page (`app/engine-connection.ts`). */
+/** The engine of a page in its worker, which `main.ts` starts. */
 import { loadLanguage } from "../i18n/language";
 import { createCanvas } from "../stage/rendering/canvas";
 import { Engine } from "./engine";
@@ -17,11 +17,23 @@ export interface EngineHello {
   readonly isSupported: boolean;
 }
 
-// The renderer loads while the page prepares the canvas; the engine reports it if it does not load.
-import("./stage-chunk").catch(() => undefined);
-
-/** Resolves with the engine once the first message has started it. */
-let engine: Promise<Engine> | null = null;
+/** Run the engine of the page that has started this worker. */
+export function serveEngine(): void {
+  // The renderer loads while the page prepares the canvas; the engine reports it if it does not load.
+  import("./stage-chunk").catch(() => undefined);
+  /** Resolves with the engine once the first message has started it. */
+  let engine: Promise<Engine> | null = null;
+  self.addEventListener("message", ({ data }: MessageEvent<EngineStart | EngineCommand>) => {
+    if (data.type === "start") engine = start(data);
+    else void engine?.then((started) => started.handle(data));
+  });
+  // Only errors reach the page.
+  self.addEventListener("unhandledrejection", (event) => {
+    event.preventDefault();
+    reportError(event.reason);
+  });
+  self.postMessage({ type: "hello", isSupported: hasGraphics() } satisfies EngineHello);
+}
 
 async function start({ canvas, options }: EngineStart): Promise<Engine> {
   await loadLanguage(options.language);
@@ -29,19 +41,6 @@ async function start({ canvas, options }: EngineStart): Promise<Engine> {
   void started.start();
   return started;
 }
-
-self.addEventListener("message", ({ data }: MessageEvent<EngineStart | EngineCommand>) => {
-  if (data.type === "start") engine = start(data);
-  else void engine?.then((started) => started.handle(data));
-});
-
-// Only errors reach the page.
-self.addEventListener("unhandledrejection", (event) => {
-  event.preventDefault();
-  reportError(event.reason);
-});
-
-self.postMessage({ type: "hello", isSupported: hasGraphics() } satisfies EngineHello);
 
 function hasGraphics(): boolean {
   try {
