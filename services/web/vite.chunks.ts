@@ -3,8 +3,9 @@ import type { Plugin, Rolldown } from "vite";
 
 /** Entry point of the page and of its worker. */
 const MAIN = "/src/main.ts";
-/** Modules that the page loads before and after the first frame. */
-const PAGE = ["src/app/start.ts", "src/audio/sound.ts", "src/ui/mapping/mapping-dialog.ts"];
+/** First module of the page, and modules that it loads later and that use some of the engine's. */
+const PAGE = "src/app/start.ts";
+const LATER = ["src/audio/sound.ts", "src/ui/mapping/mapping-dialog.ts"];
 /** Modules that the worker loads: the engine, and the renderer. */
 const ENGINE = "src/engine/worker.ts";
 const STAGE = "src/engine/stage-chunk.ts";
@@ -31,7 +32,7 @@ function nameShared(id: string, context: Rolldown.ChunkingContext): string | nul
   for (const importer of importers)
     for (const one of context.getModuleInfo(importer)?.importers ?? []) importers.add(one);
   const isImportedBy = (...paths: string[]) => paths.some((path) => [...importers].some(endsWith(path)));
-  return isImportedBy(...PAGE) && isImportedBy(ENGINE, STAGE) ? "shared" : null;
+  return isImportedBy(PAGE, ...LATER) && isImportedBy(ENGINE, STAGE) ? "shared" : null;
 }
 
 /**
@@ -44,7 +45,7 @@ export const preloadScripts: Plugin = {
     order: "post",
     handler: (_, { bundle = {} }) => {
       const main = findScripts(bundle, [MAIN]);
-      const page = findScripts(bundle, PAGE.slice(0, 1)).filter((file) => !main.includes(file));
+      const page = findScripts(bundle, [PAGE]).filter((file) => !main.includes(file));
       const worker = findScripts(bundle, [ENGINE, STAGE]).filter(
         (file) => !main.includes(file) && !page.includes(file),
       );
