@@ -1,48 +1,22 @@
-import type { Plugin } from "vite";
 import { defineConfig } from "vitest/config";
-
-/** Scripts of the engine's worker that draw the first frame. */
-const ENGINE_SCRIPTS = /^assets\/worker-(engine|stage-chunk|performer)-/;
-
-/**
- * Adds `prefetch` links for the engine's scripts: they load in parallel with the page's. Browsers do not preload for
- * workers.
- */
-const preloadEngine: Plugin = {
-  name: "preload-engine",
-  transformIndexHtml: {
-    order: "post",
-    handler: (_, { bundle }) =>
-      Object.keys(bundle ?? {})
-        .filter((file) => ENGINE_SCRIPTS.test(file))
-        .map((file) => ({
-          tag: "link",
-          attrs: { rel: "prefetch", href: `/${file}` },
-          injectTo: "head",
-        })),
-  },
-};
+import { preloadScripts, startupChunks } from "./vite.chunks.ts";
+import { threeModules } from "./vite.three.ts";
 
 /** Time limit of a test, a hook and a polled expectation, in milliseconds. It only ends tests that hang. */
 const TEST_TIMEOUT_MS = 120_000;
 
 export default defineConfig({
-  plugins: [preloadEngine],
+  plugins: [threeModules, preloadScripts],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,
     target: "es2023",
     assetsInlineLimit: 0,
-    // The initial modules stay in one chunk, although main.ts awaits its translations.
-    rolldownOptions: { output: { codeSplitting: { groups: [{ name: "page", tags: ["$initial"] }] } } },
+    // The worker has no document to which links could be added.
+    modulePreload: false,
+    rolldownOptions: { output: { codeSplitting: { groups: startupChunks } } },
     // three.js is one chunk of about 600 kB that loads after the page has been drawn.
     chunkSizeWarningLimit: 700,
-  },
-  worker: {
-    format: "es",
-    rolldownOptions: {
-      output: { entryFileNames: "assets/worker-engine-[hash].js", chunkFileNames: "assets/worker-[name]-[hash].js" },
-    },
   },
   // The prior and the constants are imported from proto/.
   server: {

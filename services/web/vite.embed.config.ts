@@ -1,6 +1,7 @@
 /** Build of the embeddable scripts (at stable URLs) and of the examples page. */
 import { defineConfig } from "vite";
 import { additionalBuild } from "./vite.additional.ts";
+import { threeModules } from "./vite.three.ts";
 
 /** Entry points, served as `embed/NAME.js`. Their chunks have a content hash in their names and are cached forever. */
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
@@ -8,8 +9,9 @@ const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/packag
 /** Modules for rendering and for the examples page, which the element does not need at startup. */
 const DEFERRED = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|ui\/theme\.ts)|\/examples[./]/;
 
-export default defineConfig(
-  additionalBuild({
+export default defineConfig({
+  plugins: [threeModules],
+  ...additionalBuild({
     input: { ...ENTRIES, examples: "examples/index.html" },
     preserveEntrySignatures: "strict",
     output: {
@@ -19,4 +21,4 @@ export default defineConfig(
       codeSplitting: { groups: [{ name: "stage-element", tags: ["$initial"], test: (id) => !DEFERRED.test(id) }] },
     },
   }),
-);
+});

@@ -1,20 +1,15 @@
-/** Entry point of the page. */
-import "./style/page.css";
-import { App } from "./app/app";
-import { StartupSequence } from "./app/startup";
-import { consumeUrlToken, pageAccess } from "./client/access";
-import { loadPageLanguage } from "./i18n/language";
+/**
+ * Entry point of the page and of its worker, which runs the same script: both are built as one graph and share their
+ * chunks, and the worker starts while the modules of the page still load.
+ */
+import { startEngineWorker } from "./app/engine-worker";
 
-// Remove the token from the address before anything else can read or share that address.
-consumeUrlToken();
-addEventListener("hashchange", () => consumeUrlToken() && location.reload());
-
-const root = document.documentElement;
-root.dataset.role = pageAccess.role;
-if (pageAccess.isRestricted) root.dataset.bound = "";
-const startup = new StartupSequence(root);
-const query = new URLSearchParams(location.search);
-// The language must be known before any text is shown.
-root.lang = await loadPageLanguage(query);
-const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
-new App(canvas, query, startup).start();
+if (typeof document === "undefined") {
+  // The renderer loads at the same time; the engine reports it if it does not load.
+  import("./engine/stage-chunk").catch(() => undefined);
+  // Only errors reach the page, which then runs the engine itself.
+  import("./engine/worker").then(({ serveEngine }) => serveEngine()).catch(reportError);
+} else {
+  const worker = startEngineWorker(import.meta.url, new URLSearchParams(location.search).get("engine"));
+  void import("./app/start").then(({ startPage }) => startPage(worker));
+}

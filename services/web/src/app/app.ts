@@ -33,11 +33,9 @@ export class App implements AppParts {
   readonly playback: PlaybackController;
   readonly exporter: Exporter;
   readonly theme: ThemeChoice;
-  readonly #query: URLSearchParams;
   #mapping: Mapping = loadMapping();
 
   constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence) {
-    this.#query = query;
     const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
     canvas.ariaLabel = translate(
       "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.",
@@ -100,12 +98,12 @@ export class App implements AppParts {
     });
   }
 
-  /** Enter the session and load the stage, both at the same time. */
-  start(): void {
+  /** Enter the session and start the engine, in `worker` if there is one, both at the same time. */
+  start(worker: Promise<Worker | null>): void {
     this.page.mappingDialog.setMapping(this.#mapping);
     this.page.transport.setHealth("none");
     void this.playback.start();
-    void this.stageHost.open(this.#query.get("engine") === "page" ? "page" : "worker");
+    void this.stageHost.open(worker);
     this.avatarSlots.restore(1);
   }
 

@@ -10,10 +10,7 @@ import type {
   EngineRequest,
   EngineResults,
 } from "../engine/message";
-import type { EngineHello, EngineStart } from "../engine/worker";
-
-/** Where the engine may run: in a worker if possible, or always in the page. */
-export type EngineRealm = "worker" | "page";
+import type { EngineStart } from "../engine/worker";
 
 /** Failure of a request to the engine. */
 export class EngineError extends Error {
@@ -43,10 +40,9 @@ export class EngineConnection {
     private readonly onEvent: (event: EngineEvent) => void,
   ) {}
 
-  /** Start the engine. What was sent before is delivered then. */
-  async start(realm: EngineRealm): Promise<void> {
-    const worker = realm === "worker" ? await this.#startWorker() : null;
-    if (worker) this.#send = (command) => worker.postMessage(command);
+  /** Start the engine in `worker`, or in the page without one. What was sent before is delivered then. */
+  async start(worker: Worker | null): Promise<void> {
+    if (worker) this.#startInWorker(worker);
     else if (!(await this.#startInPage())) {
       this.#fail();
       return;
@@ -70,21 +66,8 @@ export class EngineConnection {
     });
   }
 
-  /** Start the worker and give it the canvas. Return null, with the canvas untouched, if it cannot draw. */
-  async #startWorker(): Promise<Worker | null> {
-    if (typeof Worker === "undefined" || !("transferControlToOffscreen" in this.canvas)) return null;
-    const worker = new Worker(new URL("../engine/worker.ts", import.meta.url), { type: "module", name: "engine" });
-    const isSupported = await new Promise<boolean>((resolve) => {
-      worker.onmessage = ({ data }: MessageEvent<EngineHello>) => resolve(data.isSupported);
-      worker.onerror = (event) => {
-        event.preventDefault();
-        resolve(false);
-      };
-    });
-    if (!isSupported) {
-      worker.terminate();
-      return null;
-    }
+  /** Give the canvas to the worker. */
+  #startInWorker(worker: Worker): void {
     // Errors of the worker are errors of the page.
     worker.onerror = (event) => {
       event.preventDefault();
@@ -93,7 +76,7 @@ export class EngineConnection {
     worker.onmessage = ({ data }: MessageEvent<EngineEvent>) => this.#onEvent(data);
     const canvas = this.canvas.transferControlToOffscreen();
     worker.postMessage({ type: "start", canvas, options: this.options } satisfies EngineStart, [canvas]);
-    return worker;
+    this.#send = (command) => worker.postMessage(command);
   }
 
   /** Start the engine in the page. Messages are copied and delivered later, as with a worker. */

@@ -15,7 +15,7 @@ import type { Page } from "../ui/page";
 import { LANDSCAPE_PHONE, PHONE } from "../ui/panel";
 import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
-import { type EngineConnection, EngineError, type EngineRealm } from "./engine-connection";
+import { type EngineConnection, EngineError } from "./engine-connection";
 import { GamepadPolling } from "./gamepad-polling";
 import type { Invitation } from "./invitation";
 import type { LimbControls } from "./limb-controls";
@@ -61,8 +61,8 @@ export class StageHost {
     );
   }
 
-  /** Start the engine and pass the inputs to it. */
-  async open(realm: EngineRealm): Promise<void> {
+  /** Start the engine, in the worker if there is one, and pass the inputs to it. */
+  async open(worker: Promise<Worker | null>): Promise<void> {
     const { engine, reducedMotion } = this.options;
     this.#setSettings({
       reducedMotion: reducedMotion.matches,
@@ -74,7 +74,7 @@ export class StageHost {
     this.resize();
     addEventListener("resize", () => this.resize());
     this.#listenToInputs();
-    await engine.start(realm);
+    await engine.start(await worker);
   }
 
   setTheme(theme: Theme): void {

@@ -63,11 +63,15 @@ export class Engine {
   #lastState: StageState | null = null;
   #lastPosition = NaN;
 
-  /** Call `start` once afterwards. Events are sent by `send`. */
+  /**
+   * Call `start` once afterwards. Events are sent by `send`. `driver` is the name of the graphics driver, if it is known
+   * already.
+   */
   constructor(
     private readonly canvas: StageCanvas,
     private readonly options: EngineOptions,
     private readonly send: (event: EngineEvent) => void,
+    private readonly driver?: string,
   ) {
     this.#clockShiftMs = options.timeOrigin - performance.timeOrigin;
     this.#access = new Access(options.server, options.token);
@@ -88,7 +92,7 @@ export class Engine {
   async start(): Promise<void> {
     let graphics: Graphics;
     try {
-      graphics = openGraphics(this.canvas, this.options.bestQuality);
+      graphics = openGraphics(this.canvas, this.options.bestQuality, this.driver);
     } catch {
       this.send({ type: "unavailable", reason: "graphics" });
       return;

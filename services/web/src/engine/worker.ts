@@ -1,6 +1,6 @@
-/** Worker that hosts the engine of a page (`app/engine-connection.ts`). */
+/** The engine of a page in its worker, which `main.ts` starts. */
 import { loadLanguage } from "../i18n/language";
-import { createCanvas } from "../stage/rendering/canvas";
+import { readDriverName } from "../stage/rendering/graphics";
 import { Engine } from "./engine";
 import type { EngineCommand, EngineOptions } from "./message";
 
@@ -17,38 +17,35 @@ export interface EngineHello {
   readonly isSupported: boolean;
 }
 
-// The renderer loads while the page prepares the canvas; the engine reports it if it does not load.
-import("./stage-chunk").catch(() => undefined);
+/** Run the engine of the page that has started this worker. */
+export function serveEngine(): void {
+  const driver = findDriver();
+  /** Resolves with the engine once the first message has started it. */
+  let engine: Promise<Engine> | null = null;
+  self.addEventListener("message", ({ data }: MessageEvent<EngineStart | EngineCommand>) => {
+    if (data.type === "start") engine = start(data, driver ?? undefined);
+    else void engine?.then((started) => started.handle(data));
+  });
+  // Only errors reach the page.
+  self.addEventListener("unhandledrejection", (event) => {
+    event.preventDefault();
+    reportError(event.reason);
+  });
+  self.postMessage({ type: "hello", isSupported: driver !== null } satisfies EngineHello);
+}
 
-/** Resolves with the engine once the first message has started it. */
-let engine: Promise<Engine> | null = null;
-
-async function start({ canvas, options }: EngineStart): Promise<Engine> {
+async function start({ canvas, options }: EngineStart, driver?: string): Promise<Engine> {
   await loadLanguage(options.language);
-  const started = new Engine(canvas, options, (event) => self.postMessage(event));
+  const started = new Engine(canvas, options, (event) => self.postMessage(event), driver);
   void started.start();
   return started;
 }
 
-self.addEventListener("message", ({ data }: MessageEvent<EngineStart | EngineCommand>) => {
-  if (data.type === "start") engine = start(data);
-  else void engine?.then((started) => started.handle(data));
-});
-
-// Only errors reach the page.
-self.addEventListener("unhandledrejection", (event) => {
-  event.preventDefault();
-  reportError(event.reason);
-});
-
-self.postMessage({ type: "hello", isSupported: hasGraphics() } satisfies EngineHello);
-
-function hasGraphics(): boolean {
+/** Return the name of the graphics driver; null if a worker cannot draw. */
+function findDriver(): string | null {
   try {
-    const context = createCanvas(1, 1).getContext("webgl2") as WebGL2RenderingContext | null;
-    context?.getExtension("WEBGL_lose_context")?.loseContext();
-    return context !== null && typeof requestAnimationFrame === "function";
+    return typeof requestAnimationFrame === "function" ? readDriverName() : null;
   } catch {
-    return false;
+    return null;
   }
 }

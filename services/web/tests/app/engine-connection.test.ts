@@ -1,5 +1,6 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { EngineConnection, EngineError } from "../../src/app/engine-connection";
+import { startEngineWorker } from "../../src/app/engine-worker";
 import type { EngineCommand, EngineEvent } from "../../src/engine/message";
 
 const OPTIONS = { server: "", token: null, language: "en", timeOrigin: 0, bestQuality: false } as const;
@@ -42,10 +43,17 @@ beforeEach(() => {
   [events, transferred] = [[], 0];
   [FakeWorker.first, FakeWorker.started] = [{ type: "hello", isSupported: true }, []];
   vi.stubGlobal("Worker", FakeWorker);
-  const canvas = {
-    getContext: () => null,
-    transferControlToOffscreen: () => (transferred++, "offscreen"),
-  } as unknown as HTMLCanvasElement;
+  class FakeCanvas {
+    getContext(): null {
+      return null;
+    }
+    transferControlToOffscreen(): string {
+      transferred++;
+      return "offscreen";
+    }
+  }
+  vi.stubGlobal("HTMLCanvasElement", FakeCanvas);
+  const canvas = new FakeCanvas() as unknown as HTMLCanvasElement;
   connection = new EngineConnection(canvas, OPTIONS, (event) => events.push(event));
 });
 afterEach(() => void vi.unstubAllGlobals());
@@ -55,7 +63,7 @@ const toggleCamera: EngineCommand = { type: "toggle camera" };
 test("a worker gets the canvas, then what was sent before it had started, in order", async () => {
   connection.post({ type: "performer", performer: 1 });
   connection.post(toggleCamera);
-  await connection.start("worker");
+  await connection.start(await startEngineWorker("main.js", null));
   connection.post({ type: "performer", performer: 2 });
   const [worker] = FakeWorker.started;
   expect(worker.received.map(({ type }) => type)).toEqual(["start", "performer", "toggle camera", "performer"]);
@@ -67,14 +75,14 @@ test("a worker gets the canvas, then what was sent before it had started, in ord
 test("errors of a running worker are errors of the page", async () => {
   const reported: unknown[] = [];
   vi.stubGlobal("reportError", (error: unknown) => reported.push(error));
-  await connection.start("worker");
+  await connection.start(await startEngineWorker("main.js", null));
   const error = Object.assign(new Event("error"), { message: "no limb 9", filename: "engine.js", lineno: 3 });
   FakeWorker.started[0].onerror?.(error);
   expect(String(reported[0])).toContain("no limb 9 (engine.js:3)");
 });
 
 test("responses reach their requests", async () => {
-  await connection.start("worker");
+  await connection.start(await startEngineWorker("main.js", null));
   const [worker] = FakeWorker.started;
   const [picture, keyframes] = [
     connection.request({ kind: "picture" }),
@@ -94,14 +102,14 @@ test.for([
 ] as const)("the engine runs in the page if the worker %s", async ([, first]) => {
   FakeWorker.first = first;
   connection.post(toggleCamera);
-  await connection.start("worker");
+  await connection.start(await startEngineWorker("main.js", null));
   expect([FakeWorker.started[0].isTerminated, transferred]).toEqual([true, 0]);
   // This page has no graphics either: its engine says so.
   await expect.poll(() => events.map(({ type }) => type)).toContain("unavailable");
 });
 
 test("the engine runs in the page if a worker is not wanted or not possible", async () => {
-  await connection.start("page");
+  await connection.start(await startEngineWorker("main.js", "page"));
   expect(FakeWorker.started).toEqual([]);
   await expect.poll(() => events.map(({ type }) => type)).toContain("unavailable");
 });
@@ -113,7 +121,7 @@ test("requests fail, and later messages are dropped, if no engine can be loaded"
   });
   const before = connection.request({ kind: "picture" });
   const rejected = expect(before).rejects.toBeInstanceOf(EngineError);
-  await connection.start("worker");
+  await connection.start(await startEngineWorker("main.js", null));
   await rejected;
   expect(events).toEqual([{ type: "unavailable", reason: "not loaded" }]);
   connection.post(toggleCamera);

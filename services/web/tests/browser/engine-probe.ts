@@ -36,8 +36,8 @@ type RealmFunction<Arg, T> = (arg: Arg) => T | Promise<T>;
 /** Results that are cheap to transfer to the test. */
 type Plain = boolean | number | string | null | undefined | { readonly [key: string]: Plain };
 
-/** File name of the engine's script. */
-const ENGINE_SCRIPT = /engine/;
+/** File name of the engine's script, which is that of its page. */
+const ENGINE_SCRIPT = /main-/;
 
 /** Errors of an evaluation whose realm ended, because the page navigated or the worker was terminated. */
 const REALM_LOSS = /Execution context was destroyed|Worker was closed|has been closed/;

@@ -95,7 +95,7 @@ describeInBrowser("engine", { server: "open" }, ({ open }) => {
     const page = await open("", {
       before: async (page) => {
         await page.addInitScript(removeOffscreenGraphics);
-        await page.route("**/worker-engine-*.js", async (route) => {
+        await page.route("**/assets/main-*.js", async (route) => {
           const response = await route.fetch();
           await route.fulfill({ response, body: `(${removeOffscreenGraphics})();\n${await response.text()}` });
         });

@@ -5,6 +5,9 @@ import { describeInBrowser } from "./browser-suite";
 import { waitInEngine } from "./engine-probe";
 import { waitForFirstPose } from "./page-probe";
 
+/** Files that are loaded after the first frame. */
+const DEFERRED_FILES = [/inter-.*\.woff2/, /marionette-/, /sound-/, /-decoder-/];
+
 describeInBrowser("startup", { server: "open" }, ({ open }) => {
   test("the page can be used before the stage loads, and the rest follows", async () => {
     const requests: string[] = [];
@@ -25,7 +28,7 @@ describeInBrowser("startup", { server: "open" }, ({ open }) => {
         });
       },
     });
-    const deferred = [/inter-.*\.woff2/, /marionette-/, /sound-/];
+    const deferred = DEFERRED_FILES.slice(0, 3);
     expect((await initialRequests)?.filter((path) => deferred.some((pattern) => pattern.test(path)))).toEqual([]);
     await waitForFirstPose(page);
     await page.waitForFunction(() => !("startup" in document.documentElement.dataset));
@@ -37,6 +40,28 @@ describeInBrowser("startup", { server: "open" }, ({ open }) => {
       const { scene } = globalThis.bunraku.stage;
       return ["floor", "strings"].every((name) => scene.getObjectByName(name) !== undefined);
     });
+  });
+
+  test("the page and its worker load few scripts before the first frame, all of them linked from the document", async () => {
+    const scripts = new Set<string>();
+    const page = await open("", {
+      before: async (page) => {
+        page.on("request", (request) => {
+          const { pathname } = new URL(request.url());
+          if (pathname.endsWith(".js")) scripts.add(pathname);
+        });
+      },
+    });
+    await waitForFirstPose(page);
+    const linked = await page.evaluate(() =>
+      Array.from(
+        document.querySelectorAll<HTMLLinkElement & HTMLScriptElement>("link[href$='.js'], script[src$='.js']"),
+        ({ href, src }) => new URL(href || src).pathname,
+      ),
+    );
+    const initial = [...scripts].filter((path) => !DEFERRED_FILES.some((pattern) => pattern.test(path)));
+    expect(initial.sort()).toEqual(linked.sort());
+    expect(linked.length).toBeLessThanOrEqual(6);
   });
 
   test("the page works and shows a notice if the stage fails to load", async () => {

@@ -8,8 +8,8 @@ import { text } from "node:stream/consumers";
 
 /** Path of the script of the pages. */
 const PROBE_PATH = "/probe-of-tests.js";
-/** Script of the page's worker. */
-const WORKER_PATH = /\/worker-engine-[\w-]+\.js$/;
+/** Script of the page's worker, which the page runs too. */
+const WORKER_PATH = /\/assets\/main-[\w-]+\.js$/;
 
 /** Scripts that run before those of pages, and before those of their workers. */
 export interface Probes {
@@ -47,7 +47,7 @@ export async function startProbeProxy(target: string, probes: Probes): Promise<P
         .end(
           isPage
             ? content.replace("<head>", `$&<script src="${PROBE_PATH}"></script>`)
-            : `${probes.worker}\n${content}`,
+            : `if (!("document" in globalThis)) {\n${probes.worker}\n}\n${content}`,
         );
     });
     forwarded.on("error", () => response.destroy());

@@ -12,11 +12,11 @@ export interface Graphics {
 }
 
 /**
- * Open the context of `canvas`. `pinQuality` keeps the best quality on any machine, for screenshots. Throw if the
- * browser has no WebGL 2.
+ * Open the context of `canvas`. `pinQuality` keeps the best quality on any machine, for screenshots. `driver` is the
+ * name of the graphics driver, if it is known already. Throw if the browser has no WebGL 2.
  */
-export function openGraphics(canvas: StageCanvas, pinQuality = false): Graphics {
-  const quality = new AdaptiveQuality(rendererName(), pinQuality);
+export function openGraphics(canvas: StageCanvas, pinQuality = false, driver = readDriverName()): Graphics {
+  const quality = new AdaptiveQuality(driver ?? "", pinQuality);
   const context = canvas.getContext("webgl2", {
     antialias: !quality.quality.simpleMaterials,
     powerPreference: "high-performance",
@@ -26,12 +26,12 @@ export function openGraphics(canvas: StageCanvas, pinQuality = false): Graphics 
 }
 
 /**
- * Return the name of the graphics driver, from a separate context: a canvas fixes its antialiasing with its first
- * context.
+ * Return the name of the graphics driver, empty if it is secret; null without WebGL 2. It is read from a separate
+ * context: a canvas fixes its antialiasing with its first context.
  */
-function rendererName(): string {
+export function readDriverName(): string | null {
   const context = createCanvas(1, 1).getContext("webgl2") as WebGL2RenderingContext | null;
-  if (!context) throw new Error("The browser does not support WebGL 2.");
+  if (!context) return null;
   const debugInfo = context.getExtension("WEBGL_debug_renderer_info");
   const name = debugInfo ? String(context.getParameter(debugInfo.UNMASKED_RENDERER_WEBGL)) : "";
   context.getExtension("WEBGL_lose_context")?.loseContext();
