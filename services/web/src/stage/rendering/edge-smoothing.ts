@@ -13,11 +13,13 @@ uniform sampler2D picture; uniform vec2 texel;
 float luma(vec3 colour) { return dot(colour, vec3(.299, .587, .114)); }
 void main() {
   vec2 at = gl_FragCoord.xy * texel;
-  float leftUp = luma(texture2D(picture, at + vec2(-texel.x, texel.y)).rgb);
-  float rightUp = luma(texture2D(picture, at + texel).rgb);
-  float leftDown = luma(texture2D(picture, at - texel).rgb);
-  float rightDown = luma(texture2D(picture, at + vec2(texel.x, -texel.y)).rgb);
-  float centre = luma(texture2D(picture, at).rgb);
+  // Single texels: interpolated ones take several times as long without a graphics processor.
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  float leftUp = luma(texelFetch(picture, pixel + ivec2(-1, 1), 0).rgb);
+  float rightUp = luma(texelFetch(picture, pixel + 1, 0).rgb);
+  float leftDown = luma(texelFetch(picture, pixel - 1, 0).rgb);
+  float rightDown = luma(texelFetch(picture, pixel + ivec2(1, -1), 0).rgb);
+  float centre = luma(texelFetch(picture, pixel, 0).rgb);
   float low = min(centre, min(min(leftUp, rightUp), min(leftDown, rightDown)));
   float high = max(centre, max(max(leftUp, rightUp), max(leftDown, rightDown)));
   if (high - low < max(.04, .125 * high)) discard;

@@ -37,6 +37,12 @@ const FIRST_SOFTWARE_LEVEL = 3;
 const GRAPHICS_TARGET_S = 1 / 60;
 const SOFTWARE_TARGET_S = 1 / 30;
 /**
+ * In software, a picture of at most this share of the resolution is kept at a frame time of 0.05 s: a coarser one looks
+ * worse than one that moves less smoothly.
+ */
+const CLEAN_SCALE = 0.75;
+const CLEAN_TARGET_S = 1 / 25;
+/**
  * Interval of the slowest displays, in seconds: browsers that save energy draw 30 frames per second. A longer one is the
  * machine's.
  */
@@ -68,7 +74,7 @@ const TRIAL_DURATION_S = 5;
 export class AdaptiveQuality {
   readonly #isPinned: boolean;
   readonly #levels: readonly Quality[];
-  readonly #targetS: number;
+  readonly #isSoftware: boolean;
   #level: number;
   #framesToSkip = WARM_UP_FRAMES;
   readonly #frameTimes: number[] = [];
@@ -79,11 +85,10 @@ export class AdaptiveQuality {
 
   /** `renderer` is the name of the graphics driver; `pinned` keeps the best quality, however slow. */
   constructor(renderer: string, pinned: boolean) {
-    const isSoftware = !pinned && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
+    this.#isSoftware = !pinned && /swiftshader|llvmpipe|softpipe|software|basic render/i.test(renderer);
     this.#isPinned = pinned;
-    this.#levels = isSoftware ? SOFTWARE_LEVELS : GRAPHICS_LEVELS;
-    this.#targetS = isSoftware ? SOFTWARE_TARGET_S : GRAPHICS_TARGET_S;
-    this.#level = isSoftware ? FIRST_SOFTWARE_LEVEL : 0;
+    this.#levels = this.#isSoftware ? SOFTWARE_LEVELS : GRAPHICS_LEVELS;
+    this.#level = this.#isSoftware ? FIRST_SOFTWARE_LEVEL : 0;
   }
 
   get quality(): Quality {
@@ -121,10 +126,20 @@ export class AdaptiveQuality {
     const windowS = sorted.reduce((sum, time) => sum + time, 0);
     this.#frameTimes.length = 0;
     const median = seconds < VERY_SLOW_FRAME_S ? sorted[WINDOW_FRAMES >> 1] : seconds;
-    const targetS = Math.max(this.#targetS, Math.min(displayS, SLOWEST_DISPLAY_S));
+    const targetS = this.#targetS(this.#level, displayS);
     if (median > SLOW * targetS) return this.#reduce(median / targetS);
-    if (median < FAST * targetS) this.#fastS += windowS;
+    if (median < FAST * this.#targetS(Math.max(0, this.#level - 1), displayS)) this.#fastS += windowS;
     return this.#raise();
+  }
+
+  /** Return the frame time that is aimed at in a level. */
+  #targetS(level: number, displayS: number): number {
+    const target = !this.#isSoftware
+      ? GRAPHICS_TARGET_S
+      : this.#levels[level].pixelRatioScale <= CLEAN_SCALE
+        ? CLEAN_TARGET_S
+        : SOFTWARE_TARGET_S;
+    return Math.max(target, Math.min(displayS, SLOWEST_DISPLAY_S));
   }
 
   /** `slowness` is the frame time as a multiple of the target. */

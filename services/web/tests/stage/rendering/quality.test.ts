@@ -99,6 +99,16 @@ test("software rendering aims at 30 frames a second, and never gets materials th
   expect(choice.bestQuality.simpleMaterials).toBe(true);
 });
 
+test("in software the picture stays clean at 20 frames a second, and becomes clean again", () => {
+  const choice = new AdaptiveQuality(SOFTWARE, false);
+  for (let i = 0; i < 1000; i++) choice.addFrameTime(1 / 20.5);
+  expect(choice.quality.pixelRatioScale).toBe(0.75);
+  for (let i = 0; i < 100; i++) choice.addFrameTime(1 / 15);
+  expect(choice.quality.pixelRatioScale).toBe(0.6);
+  for (let i = 0; i < 1000; i++) choice.addFrameTime(1 / 24);
+  expect(choice.quality.pixelRatioScale).toBe(0.75);
+});
+
 test("a single stutter and a page in the background do not count", () => {
   const choice = new AdaptiveQuality("", false);
   for (let i = 0; i < 200; i++) choice.addFrameTime(i % 10 === 0 ? 0.2 : 1 / 60);
