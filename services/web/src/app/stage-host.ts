@@ -210,7 +210,7 @@ export class StageHost {
     });
     listenToMouse(canvas, window, commands, getMapping);
     listenToPointer(canvas, (event) => engine.post({ type: "pointer", event }));
-    this.#gamepad = createGamepadInput(commands, getMapping, () => navigator.getGamepads());
+    this.#gamepad = createGamepadInput(commands, getMapping, () => navigator.getGamepads?.() ?? []);
     // A page in the background draws no frames, so nothing would release the inputs that were pressed.
     document.addEventListener("visibilitychange", () => {
       this.#setSettings({ isHidden: document.hidden });
