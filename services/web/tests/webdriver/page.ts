@@ -36,7 +36,10 @@ export async function waitFor<Args extends unknown[], Result>(
     return "null";
   }`;
   const found = JSON.parse(await window.call(declaration, JSON.stringify(args))) as Result;
-  if (found === null) throw new Error(`The page did not show ${what} within ${WAIT_TIMEOUT_MS / 1000} s`);
+  if (found === null) {
+    const text = await evaluate(window, () => document.body.innerText.replaceAll("\n", " | "));
+    throw new Error(`The page did not show ${what} within ${WAIT_TIMEOUT_MS / 1000} s. It shows: ${text}`);
+  }
   return found as NonNullable<Result>;
 }
 

@@ -28,7 +28,10 @@ function recordErrors(): void {
   Object.assign(window, { probe: { errors } });
   addEventListener(
     "error",
-    ({ message, target }) => {
+    (event) => {
+      const { message, target } = event;
+      // An element announces its errors by events of its own.
+      if (event instanceof CustomEvent) return;
       // A hint that was of no use is no error.
       if (target instanceof HTMLLinkElement && /^(modulepreload|prefetch)$/.test(target.rel)) return;
       errors.push(message ?? `not loaded: ${(target as Element | null)?.outerHTML}`);
