@@ -118,7 +118,7 @@ bench-audio: setup
 
 # test the page in Firefox and WebKitGTK: needs firefox-esr, webkit2gtk-driver and xvfb
 test-webdriver: setup
-	cd services/web && npx vitest run --config tests/webdriver/vitest.config.ts
+	cd services/web && npx vitest run --project webdriver
 
 # take the pictures of README and docs from the running page
 pictures: setup

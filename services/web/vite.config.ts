@@ -52,6 +52,17 @@ export default defineConfig({
           sequence: { groupOrder: 1 },
         },
       },
+      {
+        extends: true,
+        test: {
+          name: "webdriver",
+          include: ["tests/webdriver/*.test.ts"],
+          globalSetup: "tests/browser/global-setup.ts",
+          // One browser at a time, because each renders in software on several processors.
+          fileParallelism: false,
+          sequence: { groupOrder: 2 },
+        },
+      },
     ],
   },
 });

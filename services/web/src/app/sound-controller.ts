@@ -50,13 +50,13 @@ export class SoundController {
   #audioStore: AudioPackets | null = null;
   /** Set while the gesture that resumed the sound is handled: its own command must not switch the sound off again. */
   #resumedByGesture = false;
-  /** Timer of `START_TIMEOUT_MS`; undefined before a gesture, and null after it has reported. */
+  /** Timer of `START_TIMEOUT_MS`; undefined before a gesture, and null after silence was reported. */
   #startTimer: ReturnType<typeof setTimeout> | undefined | null;
   readonly #abortController = new AbortController();
 
   /**
    * Gestures within `button` do not resume the sound, since the button toggles it itself. `onSilence` is called once if
-   * the browser plays no sound although it was allowed to.
+   * the browser cannot play sound, or plays none although it was allowed to.
    */
   constructor(
     private readonly onChange: (state: SoundState) => void,
@@ -142,9 +142,15 @@ export class SoundController {
     this.#startTimer = setTimeout(() => {
       this.#startTimer = undefined;
       if (!this.#preference.on || !this.#audioStore || this.#speaker?.heard) return;
-      this.#startTimer = null;
-      this.onSilence();
+      this.#reportSilence();
     }, START_TIMEOUT_MS);
+  }
+
+  #reportSilence(): void {
+    if (this.#startTimer === null) return;
+    clearTimeout(this.#startTimer);
+    this.#startTimer = null;
+    this.onSilence();
   }
 
   /** Replace the player if the motion changed; create one if the motion has sound and sound is wanted. */
@@ -183,6 +189,7 @@ export class SoundController {
     } catch (error) {
       this.#speaker?.suspend();
       console.warn("The sound of this motion cannot be played.", error);
+      this.#reportSilence();
     }
     this.#publishState();
   }

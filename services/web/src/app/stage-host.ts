@@ -56,7 +56,7 @@ export class StageHost {
     const { canvas, page, limbs, getMapping } = options;
     this.#overlay = new StageOverlay(canvas, page, () => options.getPlayback().current);
     this.#gamepad = new GamepadPolling(
-      createGamepadInput(limbs.commands, getMapping, () => navigator.getGamepads()),
+      createGamepadInput(limbs.commands, getMapping, () => navigator.getGamepads?.() ?? []),
       page.mappingDialog,
     );
   }

@@ -24,6 +24,8 @@ const MAX_WAIT_LEAD_S = 0.12;
 const MIN_LEAD_S = 0.03;
 /** Time for which played slots are remembered, in seconds: no device has more latency. */
 const HISTORY_S = 3;
+/** Largest lead of a device's timestamp before the page's clock, in milliseconds: frames are heard in the past. */
+const MAX_TIMESTAMP_LEAD_MS = 20;
 /** Tolerance in comparing positions, in microseconds. */
 const POSITION_TOLERANCE_US = 10;
 /** Time constant of a cut, in seconds. */
@@ -144,7 +146,11 @@ export class AudioPlayer {
     const now = this.now();
     if (!this.deviceClock.isSampleDue(now)) return;
     const { contextTime = 0, performanceTime = 0 } = this.context.getOutputTimestamp();
-    if (contextTime > 0 && performanceTime > 0) this.deviceClock.addSample(contextTime, performanceTime, now);
+    if (contextTime <= 0 || performanceTime <= 0) return;
+    // WebKitGTK adds the position of the context to the time of the page.
+    const isOfPage = performanceTime <= now + MAX_TIMESTAMP_LEAD_MS;
+    if (isOfPage) this.deviceClock.addSample(contextTime, performanceTime, now);
+    else this.deviceClock.addSample(this.context.currentTime, now, now);
   }
 
   /** Cancel everything that is scheduled, since the device is suspended. */

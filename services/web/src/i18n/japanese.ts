@@ -290,6 +290,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Reset to defaults": "初期設定に戻す",
   "{pad} is connected": "{pad}を接続しました",
   "Press any button of a gamepad to connect it": "ゲームパッドのボタンを押すと接続します",
+  "This browser allows gamepads only on pages with HTTPS":
+    "このブラウザでは、HTTPSのページでのみゲームパッドを使えます",
   "Dead zone of the sticks": "スティックの遊び",
   "Smoothing of the sticks": "スティックのなめらかさ",
   "Smoothing of mouse and touch": "マウスとタッチのなめらかさ",

@@ -84,9 +84,12 @@ beforeEach(() => {
 });
 afterEach(() => void vi.unstubAllGlobals());
 
-function createController(preferenceStore: SoundPreferenceStore = browserSoundPreference): void {
+function createController(
+  preferenceStore: SoundPreferenceStore = browserSoundPreference,
+  onSilence: () => void = () => undefined,
+): void {
   viewer = new FakeViewer();
-  controller = new SoundController((state) => states.push(state), button, preferenceStore);
+  controller = new SoundController((state) => states.push(state), button, preferenceStore, onSilence);
   controller.setViewer(viewer as unknown as SoundSource);
 }
 
@@ -237,13 +240,18 @@ describe("sound switched off by preference", () => {
     expect([speakers.length, players.length]).toEqual([1, 1]);
   });
 
-  test("sound that cannot be loaded is not shown as audible", async () => {
+  test("sound that cannot be loaded is not shown as audible, and reported once", async () => {
     const warn = vi.spyOn(console, "warn").mockImplementation(() => undefined);
+    const reports: string[] = [];
+    createController({ load: () => stored, save: () => undefined }, () => reports.push("no sound"));
+    await viewer.showMotion(true);
     decoder = Promise.reject(new Error("not loaded"));
     controller.toggle();
     dispatchGesture();
     await nextTask();
     expect([players.length, speakers[0].heard, warn.mock.calls.length]).toEqual([0, false, 1]);
+    await viewer.showMotion(true);
+    expect([warn.mock.calls.length, reports]).toEqual([2, ["no sound"]]);
     warn.mockRestore();
   });
 

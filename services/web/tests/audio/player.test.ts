@@ -103,6 +103,18 @@ function maxStep(from: number): number {
 }
 
 describe("playback", () => {
+  test("plays in time on a device whose timestamps lie in the future", () => {
+    device.getOutputTimestamp = () => ({
+      contextTime: device.currentTime,
+      performanceTime: now + device.currentTime * 1000,
+    });
+    retime();
+    start();
+    pass(1_000);
+    expect(Math.abs(player.leadAt(now)!.time - viewerTime(now))).toBeLessThan(STEP_MS * 1000);
+    expect(device.output.at(-1)?.sources).toBe(1);
+  });
+
   test("plays the reported stage time without gaps or clicks, across a loop", () => {
     retime();
     start();

@@ -13,7 +13,18 @@ export interface ServerOptions {
   secret?: string;
   /** Other origins whose pages may use the server, separated by commas. */
   origins?: string;
+  /** Wait longer than any test for puppeteers who are silent, as a page is while it compiles shaders in software. */
+  isPatient?: boolean;
 }
+
+/** Program of a patient server. */
+const PATIENT_SERVER = `
+from bunraku.marionette import ownership
+from bunraku.session import stage_endpoint
+ownership.INPUT_TIMEOUT_US = stage_endpoint.PUPPETEER_TIMEOUT_US = 3_600_000_000
+from bunraku.cli import app
+app()
+`;
 
 export interface RunningServer {
   url: string;
@@ -25,10 +36,12 @@ export async function startServer({
   demo = false,
   secret = "",
   origins = "",
+  isPatient = false,
 }: ServerOptions = {}): Promise<RunningServer> {
   const data = mkdtempSync(join(tmpdir(), "bunraku-browser-"));
   const options = ["up", "--port", "0", "--data", data, ...(demo ? ["--demo"] : [])];
-  const server = spawn(join(REPOSITORY, ".venv/bin/bunraku"), options, {
+  const [program, main] = isPatient ? ["python", ["-c", PATIENT_SERVER]] : ["bunraku", []];
+  const server = spawn(join(REPOSITORY, ".venv/bin", program), [...main, ...options], {
     stdio: ["ignore", "pipe", "inherit"],
     env: { ...process.env, COLUMNS: "200", NO_COLOR: "1", BUNRAKU_SECRET: secret, BUNRAKU_ORIGINS: origins },
   });

@@ -3,8 +3,11 @@ import { chromiumPath, launchSharedChromium } from "./chromium";
 import { type ForeignSite, startForeignSite } from "./foreign-site";
 import { makeToken, type ServerOptions, startServer } from "./server";
 
-/** `open` has the demo and no access control, `guarded` has the demo and a secret, `empty` has neither. */
-export type ServerKind = "open" | "guarded" | "empty";
+/**
+ * `open` has the demo and no access control, `patient` is one that waits for slow pages, `guarded` has the demo and a
+ * secret, `empty` has neither.
+ */
+export type ServerKind = "open" | "patient" | "guarded" | "empty";
 
 export interface SharedServer {
   /** Base URL, without a trailing slash. */
@@ -58,6 +61,7 @@ export class SharedResources {
     const options: Record<ServerKind, ServerOptions> = {
       empty: {},
       open: { demo: true, origins: site.origin },
+      patient: { demo: true, origins: site.origin, isPatient: true },
       guarded: { demo: true, origins: `${site.origin},null`, secret: SECRET },
     };
     const server = await startServer(options[kind]);

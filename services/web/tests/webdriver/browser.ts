@@ -15,6 +15,8 @@ export interface Browser {
 export interface SessionOptions {
   /** False: `localStorage` and IndexedDB cannot be used, as where a user blocks site data. */
   hasStorage?: boolean;
+  /** Open private windows. */
+  isPrivate?: boolean;
 }
 
 export interface BrowserSession {

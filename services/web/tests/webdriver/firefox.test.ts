@@ -1,3 +1,4 @@
 import { definePageCases } from "./page-cases";
+import { describeInWebDriver } from "./webdriver-suite";
 
-definePageCases("Firefox");
+describeInWebDriver("Firefox", definePageCases);

@@ -73,11 +73,23 @@ const PREFERENCES = {
   // Mesa's software renderer is on the list of blocked drivers.
   "webgl.force-enabled": true,
   "dom.w3c_touch_events.enabled": 1,
+  // Software rendering at the full rate would take all processors.
+  "layout.frame_rate": 10,
+  // Fewer processes start faster.
+  "dom.ipc.processPrelaunch.enabled": false,
+  "fission.autostart": false,
   // An audio device without hardware, or an AudioContext would never run.
   "media.cubeb.force_mock_context": true,
   "browser.download.folderList": 2,
   "ui.prefersReducedMotion": 1,
 };
+
+/**
+ * Messages that are no errors of a page: a font that was loading when the page was left (NS_BINDING_ABORTED), and sockets
+ * that it opens again.
+ */
+const NETWORK_MESSAGE =
+  /^(downloadable font: download failed .*status=2152398850|Firefox can’t establish a connection|The connection to ws)/;
 
 /** In the page, before its scripts: storage throws, as where a user blocks cookies and site data. */
 function forbidStorage(): void {
@@ -88,7 +100,7 @@ function forbidStorage(): void {
     Object.defineProperty(window, name, { get, configurable: true });
 }
 
-export async function startFirefox(program: string): Promise<Browser> {
+export async function startFirefox(program: string, ...options: string[]): Promise<Browser> {
   const folder = mkdtempSync(join(tmpdir(), "bunraku-firefox-"));
   const [profile, downloads] = [join(folder, "profile"), join(folder, "downloads")];
   for (const path of [profile, downloads]) mkdirSync(path);
@@ -103,7 +115,7 @@ export async function startFirefox(program: string): Promise<Browser> {
   const display = await startVirtualDisplay();
   const browser = startProcess(
     program,
-    ["--headless", "--no-remote", "--profile", profile, "--remote-debugging-port", "0"],
+    ["--headless", "--no-remote", "--profile", profile, "--remote-debugging-port", "0", ...options],
     { DISPLAY: display.name, HOME: folder, MOZ_CRASHREPORTER_DISABLE: "1" },
   );
   browser.stdout?.resume();
@@ -111,7 +123,7 @@ export async function startFirefox(program: string): Promise<Browser> {
   const connection = await BidiConnection.open(`${url}/session`);
   await connection.send("session.new", { capabilities: {} });
   await connection.send("session.subscribe", { events: ["log.entryAdded"] });
-  return new Firefox(connection, browser, display, folder, downloads);
+  return new Firefox(program, connection, browser, display, folder, downloads);
 }
 
 class Firefox implements Browser {
@@ -119,6 +131,7 @@ class Firefox implements Browser {
   readonly #errors = new Map<string, string[]>();
 
   constructor(
+    private readonly program: string,
     private readonly connection: BidiConnection,
     private readonly browser: ChildProcess,
     private readonly display: VirtualDisplay,
@@ -127,11 +140,12 @@ class Firefox implements Browser {
   ) {
     connection.onEvent = (_method, { level, text, source }) => {
       const { context } = source as { context: string };
-      if (level === "error") this.#errors.get(context)?.push(String(text));
+      if (level === "error" && !NETWORK_MESSAGE.test(String(text))) this.#errors.get(context)?.push(String(text));
     };
   }
 
-  async openSession({ hasStorage = true }: SessionOptions = {}): Promise<BrowserSession> {
+  async openSession({ hasStorage = true, isPrivate = false }: SessionOptions = {}): Promise<BrowserSession> {
+    if (isPrivate) return this.#openPrivateSession();
     const { connection, downloads } = this;
     const { userContext } = await connection.send<{ userContext: string }>("browser.createUserContext");
     if (!hasStorage)
@@ -156,6 +170,17 @@ class Firefox implements Browser {
       },
       close: async () => void (await connection.send("browser.removeUserContext", { userContext })),
     };
+  }
+
+  /** Start a browser whose first window is private, and the later ones too. BiDi opens none. */
+  async #openPrivateSession(): Promise<BrowserSession> {
+    const browser = await startFirefox(this.program, "--private-window", "about:blank");
+    const session = await browser.openSession();
+    const close = async () => {
+      await session.close();
+      await browser.close();
+    };
+    return { ...session, close };
   }
 
   async close(): Promise<void> {

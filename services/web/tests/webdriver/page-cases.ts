@@ -1,10 +1,12 @@
 /** The page, the element and the examples, by what a user sees and does: the same cases in each browser. */
-import { existsSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { expect, onTestFinished, test } from "vitest";
+import { createFigureFile } from "../avatar/figure-files";
 import { createBowingBvh } from "../browser/bvh-file";
 import { type BrowserWindow, type PointerType, WAIT_TIMEOUT_MS } from "./browser";
+import { connectGamepad, moveStick } from "./gamepad";
 import {
   CONTROL,
   clickButton,
@@ -17,177 +19,293 @@ import {
   pressButton,
   pressKey,
   releaseKey,
+  SHIFT,
   tapKey,
   waitFor,
+  waitForAnnouncement,
   waitForButton,
   waitForStart,
 } from "./page";
-import { type BrowserName, describeInWebDriver } from "./webdriver-suite";
+import type { WebDriverFixture } from "./webdriver-suite";
 
-/** Smallest share of pixels in the middle of the window that a puppet changes, and that the movement of a hand does. */
-const [MIN_PUPPET_SHARE, MIN_MOVEMENT_SHARE] = [0.05, 0.005];
+/** Smallest share of pixels in the middle of the window that a puppet changes. */
+const MIN_PUPPET_SHARE = 0.05;
+/** Share of these pixels that the movement of a hand changes. A screenshot without the stage changes more. */
+const isMovement = (share: number) => share > 0.005 && share < 0.5;
+/** Smallest amplitude of a sound that can be heard. */
+const MIN_SOUND_LEVEL = 0.01;
+/** Interval of polling in this process, which takes processor time from the browser. */
+const POLL_INTERVAL_MS = 200;
+
+/** Place on the stage beside the puppet. */
+const BACKGROUND: Point = { x: 60, y: 200 };
 
 const LIMB_KEYS = ["1", "2", "3", "4"];
+const PNG_SIGNATURE = "\x89PNG\r\n\x1a\n";
 
-export function definePageCases(browser: BrowserName): void {
-  describeInWebDriver(browser, (fixture) => {
-    const { open } = fixture;
+export function definePageCases(fixture: WebDriverFixture): void {
+  const { browser, open } = fixture;
 
-    /** Wait until the server reports the number of limbs that are held. */
-    async function waitForHeldLimbs(count: number): Promise<void> {
-      await expect
-        .poll(async () => (await fixture.state()).limbs.filter((holder) => holder !== null).length, {
-          timeout: WAIT_TIMEOUT_MS,
-          message: "number of limbs that are held, on the server",
-        })
-        .toBe(count);
-    }
+  /** Wait until the server reports the number of limbs that are held. */
+  async function waitForHeldLimbs(count: number): Promise<void> {
+    await poll("number of limbs that are held, on the server", async () => {
+      const { limbs } = await fixture.state();
+      return limbs.filter((holder) => holder !== null).length;
+    }).toBe(count);
+  }
 
-    /** Poll the share of the stage that differs from a screenshot. */
-    function expectChange(window: BrowserWindow, before: string) {
-      return expect.poll(async () => compareScreenshots(window, before, await window.screenshot()), {
-        timeout: WAIT_TIMEOUT_MS,
-        message: "share of pixels that differ from an earlier screenshot",
-      });
-    }
+  /** Poll the share of the stage that differs from a screenshot. */
+  function expectChange(window: BrowserWindow, before: string) {
+    return poll("share of pixels that differ from an earlier screenshot", async () =>
+      compareScreenshots(window, before, await window.screenshot()),
+    );
+  }
 
-    /** Drag a hand upwards and release it: it moves, and returns. */
-    async function pullHand(window: BrowserWindow, pointerType: PointerType, hand: Point): Promise<void> {
-      const before = await window.screenshot();
-      await point(window, pointerType, ["move", hand], ["down"]);
+  /** Drag a hand upwards and release it: it moves, and does not stay there. */
+  async function pullHand(window: BrowserWindow, pointerType: PointerType, hand: Point): Promise<void> {
+    const before = await window.screenshot();
+    await point(window, pointerType, ["move", hand], ["down"]);
+    await waitForHeldLimbs(1);
+    await point(window, pointerType, ["move", { x: hand.x - 40, y: hand.y - 60 }]);
+    await expectChange(window, before).toSatisfy(isMovement);
+    const pulled = await window.screenshot();
+    await point(window, pointerType, ["up"]);
+    await waitForHeldLimbs(0);
+    // Not compared with the first screenshot: where frames take long, the page has reduced its quality since.
+    await expectChange(window, pulled).toSatisfy(isMovement);
+  }
+
+  /** Wait until a file whose name ends with `ending` was downloaded, and return its content in Latin-1. */
+  async function waitForDownload(ending: string): Promise<string> {
+    let content = "";
+    await poll(`size of a downloaded file *${ending}`, () => {
+      const name = readdirSync(fixture.downloads()).find((name) => name.endsWith(ending));
+      const previous = content;
+      content = name === undefined ? "" : readFileSync(join(fixture.downloads(), name), "latin1");
+      return content !== "" && content === previous;
+    }).toBe(true);
+    return content;
+  }
+
+  /** Click on the background, after which browsers allow sound, and wait until it is heard. */
+  async function hearSound(window: BrowserWindow): Promise<void> {
+    await point(window, "mouse", ["move", BACKGROUND], ["down"], ["up"]);
+    await waitFor(window, "the sound switched on", () => document.querySelector('[title="Sound off"]') !== null);
+    await fixture.play();
+    await waitFor(
+      window,
+      "that sound is played",
+      (level) => globalThis.window.probe.getSoundLevel() > level,
+      MIN_SOUND_LEVEL,
+    );
+  }
+
+  test("the puppet is drawn, and pulled by mouse, touch, keys and gamepad", async () => {
+    const window = await open("?session=no-such-session");
+    await waitForAnnouncement(window, "The session has ended");
+    const empty = await window.screenshot();
+    await window.goto(`${fixture.url}/?session=${fixture.session}&name=Aiko`);
+    await waitForStart(window);
+    await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
+
+    const held = [];
+    for (const key of LIMB_KEYS) {
+      // A long press holds the limb while it lasts, a short one until the next.
+      await pressKey(window, key);
       await waitForHeldLimbs(1);
-      await point(window, pointerType, ["move", { x: hand.x - 40, y: hand.y - 60 }]);
-      await expectChange(window, before).toBeGreaterThan(MIN_MOVEMENT_SHARE);
-      await point(window, pointerType, ["up"]);
+      const { limbs, puppeteers } = await fixture.state();
+      held.push(limbs.findIndex((holder) => holder !== null));
+      expect(puppeteers.map(({ name }) => name)).toEqual(["Aiko"]);
+      await releaseKey(window, key);
+      await tapKey(window, ESCAPE);
       await waitForHeldLimbs(0);
-      await expectChange(window, before).toBeLessThan(MIN_MOVEMENT_SHARE / 2);
     }
+    expect(held.sort()).toEqual([0, 1, 2, 3]);
 
-    test("the puppet is drawn, and pulled by mouse, touch and keys", async () => {
-      const window = await open("?session=no-such-session");
-      await waitFor(window, "the notice of an ended session", () =>
-        document.body.innerText.includes("The session has ended"),
-      );
-      const empty = await window.screenshot();
-      await window.goto(`${fixture.url}/?session=${fixture.session}&name=Aiko`);
-      await waitForStart(window);
-      await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
+    // The invitation to take a hand, which covers the stage, ended with the first claim.
+    const hand = await findHand(window);
+    for (const pointerType of ["mouse", "touch"] as const) await pullHand(window, pointerType, hand);
 
-      const held = [];
-      for (const key of LIMB_KEYS) {
-        // A long press holds the limb while it lasts, a short one until the next.
-        await pressKey(window, key);
-        await waitForHeldLimbs(1);
-        const { limbs, puppeteers } = await fixture.state();
-        held.push(limbs.findIndex((holder) => holder !== null));
-        expect(puppeteers.map(({ name }) => name)).toEqual(["Aiko"]);
-        await releaseKey(window, key);
-        await tapKey(window, ESCAPE);
-        await waitForHeldLimbs(0);
-      }
-      expect(held.sort()).toEqual([0, 1, 2, 3]);
-
-      // The invitation to take a hand, which covers the stage, ended with the first claim.
-      const hand = await findHand(window);
-      for (const pointerType of ["mouse", "touch"] as const) await pullHand(window, pointerType, hand);
-    });
-
-    test("sound is switched on, and a shared link opens in a second window", async () => {
-      const window = await open("?name=Aiko");
-      await waitForStart(window);
-      await clickButton(window, "Sound");
-      await waitFor(window, "the sound switched on", () => document.querySelector('[title="Sound off"]') !== null);
-      await clickButton(window, "Sound");
-      await waitFor(window, "the sound switched off", () => document.querySelector('[title="Sound on"]') !== null);
-
-      await clickButton(window, "Share link");
-      await waitFor(window, "the note of a copied link", () => document.body.innerText.includes("Link copied"));
-      const link = await paste(window);
-      expect(new URL(link).searchParams.get("session")).toBe(fixture.session);
-      const second = await open(link);
-      await waitForStart(second);
-      await pressKey(second, "2");
-      await waitForHeldLimbs(1);
-    });
-
-    test("files are uploaded by choice and by drop, and a motion is downloaded", async () => {
-      const folder = mkdtempSync(join(tmpdir(), "bunraku-upload-"));
-      onTestFinished(() => rmSync(folder, { recursive: true }));
-      const name = `chosen in ${browser}`;
-      writeFileSync(join(folder, `${name}.bvh`), createBowingBvh(31 + browser.length));
-      const window = await open();
-      await waitForStart(window);
-      await clickButton(window, "Library");
-      await window.chooseFile('input[type=file][accept*=".bvh"]', join(folder, `${name}.bvh`));
-      await waitForMotion(window, name);
-
-      const dropped = `dropped in ${browser}`;
-      await evaluate(window, dropFile, `${dropped}.bvh`, createBowingBvh(131 + browser.length));
-      await waitForMotion(window, dropped);
-      expect(await evaluate(window, () => document.querySelectorAll(".problem").length)).toBe(0);
-
-      await pressButton(window, `Download ${dropped}`);
-      await pressButton(window, "BVH, motion for animation programs");
-      const path = join(fixture.downloads(), `${dropped}.bvh`);
-      await expect
-        .poll(() => existsSync(path) && readFileSync(path, "utf8").slice(0, 9), {
-          timeout: WAIT_TIMEOUT_MS,
-          message: `start of ${path}`,
-        })
-        .toBe("HIERARCHY");
-    });
-
-    test("without storage the page works", async () => {
-      await fixture.useSession({ hasStorage: false });
-      const window = await open();
-      await waitForStart(window);
-      expect(
-        await evaluate(window, () => {
-          try {
-            localStorage.setItem("test", "test");
-            return "storage works";
-          } catch {
-            return "storage throws";
-          }
-        }),
-      ).toBe("storage throws");
-      await pressKey(window, "2");
-      await waitForHeldLimbs(1);
-    });
-
-    test("an embedded stage is drawn and its buttons take limbs", async () => {
-      const address = `${fixture.url}/?session=${fixture.session}`;
-      const window = await open(
-        await fixture.publish(
-          `<!doctype html><title>Another site</title>
-          <script type="module" src="${fixture.url}/embed/bunraku-stage.js"></script>
-          <bunraku-stage src="${address}" controls style="width: 600px; height: 400px"></bunraku-stage>`,
-        ),
-      );
-      const empty = await window.screenshot();
-      // A page that compiles its shaders is blocked for so long that it loses its limbs.
-      await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
-      await clickButton(window, "Take the left hand");
-      await waitForHeldLimbs(1);
-      await clickButton(window, "Release the left hand, held by you");
-      await waitForHeldLimbs(0);
-    });
-
-    test("the examples are shown beside their sources", async () => {
-      const window = await open("/examples/");
-      await waitFor(window, "the sources of all examples", () =>
-        [...document.querySelectorAll("pre")].every(({ innerText }) => innerText.includes("/embed/bunraku")),
-      );
-      await waitForButton(window, "Take the left hand");
-      expect(
-        await evaluate(window, () =>
-          [...document.querySelectorAll("bunraku-stage")].flatMap(
-            ({ shadowRoot }) => shadowRoot?.querySelector<HTMLElement>(".notice:not([hidden])")?.innerText ?? [],
-          ),
-        ),
-      ).toEqual([]);
-    });
+    await evaluate(window, connectGamepad);
+    await evaluate(window, moveStick, -0.9);
+    await waitForHeldLimbs(1);
+    await evaluate(window, moveStick, 0);
+    await waitForHeldLimbs(0);
   });
+
+  test("sound is heard, and a shared link opens in a second window", async () => {
+    const window = await open("?name=Aiko");
+    await waitForStart(window);
+    await hearSound(window);
+    await clickButton(window, "Sound");
+    await waitFor(window, "the sound switched off", () => document.querySelector('[title="Sound on"]') !== null);
+
+    await clickButton(window, "Share link");
+    await waitForAnnouncement(window, "Link copied");
+    const link = await paste(window);
+    expect(new URL(link).searchParams.get("session")).toBe(fixture.session);
+    const second = await open(link);
+    await waitForStart(second);
+    await pressKey(second, "2");
+    await waitForHeldLimbs(1);
+  });
+
+  test("files are uploaded by choice and by drop; a motion and a picture are downloaded", async () => {
+    const folder = mkdtempSync(join(tmpdir(), "bunraku-upload-"));
+    onTestFinished(() => rmSync(folder, { recursive: true }));
+    const name = `chosen in ${browser}`;
+    writeFileSync(join(folder, `${name}.bvh`), createBowingBvh(31 + browser.length));
+    const window = await open();
+    await waitForStart(window);
+    await clickButton(window, "Library");
+    await window.chooseFile('input[type=file][accept*=".bvh"]', join(folder, `${name}.bvh`));
+    await waitForMotion(window, name);
+
+    const dropped = `dropped in ${browser}`;
+    const bvh = Buffer.from(createBowingBvh(131 + browser.length)).toString("base64");
+    await evaluate(window, dropFile, `${dropped}.bvh`, bvh);
+    await waitForMotion(window, dropped);
+    expect(await evaluate(window, () => document.querySelectorAll(".problem").length)).toBe(0);
+
+    await clickButton(window, "Save a picture");
+    expect((await waitForDownload(".png")).slice(0, PNG_SIGNATURE.length)).toBe(PNG_SIGNATURE);
+    // In a narrow window a motion that goes on the stage closes the library.
+    await clickButton(window, "Library");
+    await pressButton(window, `Download ${dropped}`);
+    await pressButton(window, "BVH, motion for animation programs");
+    expect((await waitForDownload(`${dropped}.bvh`)).slice(0, 9)).toBe("HIERARCHY");
+  });
+
+  test("an avatar that a private window stores is there after a reload", async () => {
+    await fixture.useSession({ isPrivate: true });
+    const window = await open();
+    await waitForStart(window);
+    await evaluate(window, dropFile, "boxes.vrm", AVATAR_BASE64);
+    await waitForAnnouncement(window, "dances here");
+    const isStored = await evaluate(window, () =>
+      globalThis.window.probe.announcements.some((text) => text.includes("everyone else sees the puppet")),
+    );
+    await window.goto(`${fixture.url}/?session=${fixture.session}`);
+    await waitForStart(window);
+    await clickButton(window, "Library");
+    await waitForButton(window, isStored ? "Choose another avatar" : "Choose your own avatar");
+  });
+
+  test("without storage the page works, and says that it cannot store an avatar", async () => {
+    await fixture.useSession({ hasStorage: false });
+    const window = await open();
+    await waitForStart(window);
+    expect(
+      await evaluate(window, () => {
+        try {
+          localStorage.setItem("test", "test");
+          return "storage works";
+        } catch {
+          return "storage throws";
+        }
+      }),
+    ).toBe("storage throws");
+    await pressKey(window, "2");
+    await waitForHeldLimbs(1);
+    await evaluate(window, dropFile, "boxes.vrm", AVATAR_BASE64);
+    expect(await waitForAnnouncement(window, "for this visit only: this browser cannot store it")).toBe(1);
+  });
+
+  test("an embedded stage is drawn and its buttons take limbs", async () => {
+    const window = await open(await fixture.publish(embedStage(fixture)));
+    const empty = await window.screenshot();
+    await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
+    await clickButton(window, "Take the left hand");
+    await waitForHeldLimbs(1);
+    await clickButton(window, "Release the left hand, held by you");
+    await waitForHeldLimbs(0);
+  });
+
+  test("the examples are shown beside their sources", async () => {
+    const window = await open("/examples/");
+    await waitFor(window, "the sources of all examples", () =>
+      [...document.querySelectorAll("pre")].every(({ innerText }) => innerText.includes("/embed/bunraku")),
+    );
+    await waitForButton(window, "Take the left hand");
+    expect(
+      await evaluate(window, () =>
+        [...document.querySelectorAll("bunraku-stage")].flatMap(
+          ({ shadowRoot }) => shadowRoot?.querySelector<HTMLElement>(".notice:not([hidden])")?.innerText ?? [],
+        ),
+      ),
+    ).toEqual([]);
+  });
+
+  test("without WebGL 2 page and element say so once, and the page works", async () => {
+    fixture.removeFeatures(() => {
+      const { HTMLCanvasElement, OffscreenCanvas } = globalThis as Partial<typeof globalThis>;
+      for (const canvas of [HTMLCanvasElement, OffscreenCanvas]) {
+        if (!canvas) continue;
+        const getContext = canvas.prototype.getContext as (type: string, ...options: unknown[]) => unknown;
+        Object.assign(canvas.prototype, {
+          getContext(type: string, ...options: unknown[]) {
+            return type === "webgl2" ? null : getContext.call(this, type, ...options);
+          },
+        });
+      }
+    });
+    const window = await open();
+    expect(await waitForAnnouncement(window, "This browser cannot draw the stage")).toBe(1);
+    await clickButton(window, "Library");
+    await waitFor(window, "the motions of the library", () => document.body.innerText.includes("with music"));
+    await window.goto(await fixture.publish(embedStage(fixture)));
+    expect(await waitForAnnouncement(window, "This browser cannot draw the stage")).toBe(1);
+  });
+
+  test("without audio, clipboard and gamepads the page says so, each once", async () => {
+    fixture.removeFeatures(() => {
+      Object.assign(globalThis, { AudioContext: undefined });
+      const { Navigator } = globalThis as Partial<typeof globalThis>;
+      if (Navigator)
+        for (const name of ["clipboard", "getGamepads"] as const)
+          delete (Navigator.prototype as Partial<Navigator>)[name];
+    });
+    const window = await open();
+    await waitForStart(window);
+    await waitForAnnouncement(window, "This browser plays no sound here");
+    await clickButton(window, "Sound");
+    await clickButton(window, "Share link");
+    await waitForAnnouncement(window, `Copy this link: ${fixture.url}/?session=${fixture.session}`);
+    expect(await waitForAnnouncement(window, "This browser plays no sound here")).toBe(1);
+    await tapKey(window, "?", SHIFT);
+    await waitFor(window, "that gamepads need HTTPS", () =>
+      document.querySelector(".pad-state")?.textContent?.includes("only on pages with HTTPS"),
+    );
+  });
+
+  test("without WebCodecs and OffscreenCanvas the puppet is drawn and the sound is heard", async () => {
+    fixture.removeFeatures(() => {
+      Object.assign(globalThis, { AudioDecoder: undefined, OffscreenCanvas: undefined });
+      const { HTMLCanvasElement } = globalThis as Partial<typeof globalThis>;
+      if (HTMLCanvasElement)
+        delete (HTMLCanvasElement.prototype as Partial<HTMLCanvasElement>).transferControlToOffscreen;
+    });
+    const window = await open();
+    await waitForStart(window);
+    await hearSound(window);
+    await pressKey(window, "2");
+    await waitForHeldLimbs(1);
+    expect(await evaluate(window, () => globalThis.window.probe.announcements)).toEqual([]);
+  });
+}
+
+/** A small avatar file. */
+const AVATAR_BASE64 = Buffer.from(createFigureFile({ vrm: 1 })).toString("base64");
+
+function poll<T>(message: string, read: () => T | Promise<T>) {
+  return expect.poll(read, { timeout: WAIT_TIMEOUT_MS, interval: POLL_INTERVAL_MS, message });
+}
+
+/** Return a page of another site with a stage. */
+function embedStage({ url, session }: WebDriverFixture): string {
+  return `<!doctype html><title>Another site</title>
+    <script type="module" src="${url}/embed/bunraku-stage.js"></script>
+    <bunraku-stage src="${url}/?session=${session}" controls style="width: 400px; height: 300px"></bunraku-stage>`;
 }
 
 /** Wait until a motion is on the stage. */
@@ -211,10 +329,11 @@ async function paste(window: BrowserWindow): Promise<string> {
   return waitFor(window, "the pasted text", () => document.querySelector("textarea")?.value);
 }
 
-/** In the page: drop a file on the stage. */
-function dropFile(name: string, text: string): void {
+/** In the page: drop a file on the stage. A driver cannot drag files into a window. */
+function dropFile(name: string, base64: string): void {
+  const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
   const dataTransfer = new DataTransfer();
-  dataTransfer.items.add(new File([text], name));
+  dataTransfer.items.add(new File([bytes], name));
   for (const type of ["dragover", "drop"]) {
     const event = new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true });
     document.querySelector("#stage")?.dispatchEvent(event);

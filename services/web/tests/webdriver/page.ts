@@ -36,7 +36,10 @@ export async function waitFor<Args extends unknown[], Result>(
     return "null";
   }`;
   const found = JSON.parse(await window.call(declaration, JSON.stringify(args))) as Result;
-  if (found === null) throw new Error(`The page did not show ${what} within ${WAIT_TIMEOUT_MS / 1000} s`);
+  if (found === null) {
+    const text = await evaluate(window, () => document.body.innerText.replaceAll("\n", " | "));
+    throw new Error(`The page did not show ${what} within ${WAIT_TIMEOUT_MS / 1000} s. It shows: ${text}`);
+  }
   return found as NonNullable<Result>;
 }
 
@@ -91,7 +94,7 @@ export async function pressButton(window: BrowserWindow, name: string): Promise<
 }
 
 /** Keys of the Actions API (W3C WebDriver, 17.4.2). */
-export const [ENTER, CONTROL, ESCAPE] = ["\uE007", "\uE009", "\uE00C"];
+export const [ENTER, SHIFT, CONTROL, ESCAPE] = ["\uE007", "\uE008", "\uE009", "\uE00C"];
 
 /** Press a key and release it, while `modifier` is pressed if there is one. */
 export function tapKey(window: BrowserWindow, key: string, modifier?: string): Promise<void> {
@@ -127,26 +130,43 @@ export async function point(
   await window.perform({ type: "pointer", id: pointerType, parameters: { pointerType }, actions });
 }
 
-/** Return the highest point of the stage over which the pointer can take a limb: one of the hands. */
+/** Distance of the invitation from the hand (`ui/strings/name-tag.ts`). */
+const INVITATION_DISTANCE_PX = 26;
+
+/**
+ * Return the place of the hand that a first visit is invited to take. The invitation stands on the side of the hand that
+ * is turned away from the performer, who is in the middle of the window.
+ */
 export async function findHand(window: BrowserWindow): Promise<Point> {
-  const { width, height } = await evaluate(window, () => {
-    const found: Point[] = [];
-    Object.assign(globalThis, { found });
-    // After the stage's own listener, which marks the canvas.
-    addEventListener("pointermove", ({ clientX: x, clientY: y, target }) => {
-      if (target instanceof HTMLCanvasElement && getComputedStyle(target).cursor === "grab") found.push({ x, y });
-    });
-    return { width: innerWidth, height: innerHeight };
-  });
-  const moves: ["move", Point][] = [];
-  for (let y = 0.35; y < 0.7; y += 0.05)
-    for (let x = 0.36; x < 0.66; x += 0.04)
-      moves.push(["move", { x: Math.round(x * width), y: Math.round(y * height) }]);
-  await point(window, "mouse", ...moves);
-  return waitFor(window, "a limb that the pointer can take", () => {
-    const { found } = globalThis as unknown as { found: Point[] };
-    return found.sort((a, b) => a.y - b.y)[0];
-  });
+  const hand = await waitFor(
+    window,
+    "the invitation to take a hand",
+    (distance) => {
+      const { invitation } = globalThis.window.probe;
+      if (!invitation) return null;
+      const { left, right, top, bottom } = invitation;
+      const x = (left + right) / 2 > innerWidth / 2 ? left - distance : right + distance;
+      return { x: Math.round(x), y: Math.round((top + bottom) / 2) };
+    },
+    INVITATION_DISTANCE_PX,
+  );
+  await point(window, "mouse", ["move", hand]);
+  await waitFor(
+    window,
+    "that the pointer can take the hand",
+    () => getComputedStyle(document.querySelector("#stage") as Element).cursor === "grab",
+  );
+  return hand;
+}
+
+/** Wait until the page or an element has announced a text that contains `part`, and return how often it has. */
+export function waitForAnnouncement(window: BrowserWindow, part: string): Promise<number> {
+  return waitFor(
+    window,
+    `the message "${part}"`,
+    (part) => globalThis.window.probe.announcements.filter((text) => text.includes(part)).length,
+    part,
+  );
 }
 
 /** Factor by which screenshots are reduced before they are compared: the quality of edges may change at any time. */

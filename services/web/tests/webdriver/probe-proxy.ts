@@ -1,6 +1,6 @@
 /**
- * HTTP proxy before a server that adds a script to each page and its worker, before their own. WebDriver has no way to do this, and
- * no access to the console.
+ * HTTP proxy before a server that adds a script to each page and its worker, before their own. WebDriver has no way to
+ * do this, and no access to the console.
  */
 import { createServer, request as sendRequest } from "node:http";
 import { type AddressInfo, connect } from "node:net";
@@ -23,12 +23,12 @@ export interface ProbeProxy {
   stop(): Promise<void>;
 }
 
-/** Start a proxy of the server at `target`, whose pages and workers run `probes` first. */
-export async function startProbeProxy(target: string, probes: Probes): Promise<ProbeProxy> {
+/** Start a proxy of the server at `target`, whose pages and workers run the present probes first. */
+export async function startProbeProxy(target: string, getProbes: () => Probes): Promise<ProbeProxy> {
   const { hostname, port } = new URL(target);
   const proxy = createServer((request, response) => {
     if (request.url === PROBE_PATH) {
-      response.writeHead(200, { "Content-Type": "text/javascript" }).end(probes.page);
+      response.writeHead(200, { "Content-Type": "text/javascript", "Cache-Control": "no-store" }).end(getProbes().page);
       return;
     }
     const { "accept-encoding": _, ...headers } = request.headers;
@@ -47,7 +47,7 @@ export async function startProbeProxy(target: string, probes: Probes): Promise<P
         .end(
           isPage
             ? content.replace("<head>", `$&<script src="${PROBE_PATH}"></script>`)
-            : `if (!("document" in globalThis)) {\n${probes.worker}\n}\n${content}`,
+            : `if (!("document" in globalThis)) {\n${getProbes().worker}\n}\n${content}`,
         );
     });
     forwarded.on("error", () => response.destroy());

@@ -3,19 +3,17 @@ import { randomUUID } from "node:crypto";
 import { afterAll, beforeAll, beforeEach, describe, expect, onTestFinished } from "vitest";
 import { getShared } from "../browser/shared-endpoint";
 import type { SharedServer } from "../browser/shared-resources";
-import { slowDownDisplay } from "../browser/slow-display";
 import type { Browser, BrowserSession, BrowserWindow, SessionOptions, WindowSize } from "./browser";
 import { WAIT_TIMEOUT_MS } from "./browser";
 import { startFirefox } from "./firefox";
 import { evaluate } from "./page";
 import { type ProbeProxy, startProbeProxy } from "./probe-proxy";
+import { createProbes } from "./probes";
 import { findProgram } from "./processes";
 import { startWebKit } from "./webkit";
 
 /** Small, because the browsers render in software. */
 const WINDOW_SIZE: WindowSize = { width: 600, height: 420 };
-/** Interval between frames, in milliseconds: the browsers render in software. */
-const FRAME_INTERVAL_MS = 250;
 
 const BROWSERS = {
   Firefox: { programs: ["firefox-esr", "Xvfb"], start: startFirefox },
@@ -37,6 +35,8 @@ export interface WebDriverFixture {
   readonly url: string;
   /** Session of the present test, which plays the demo and is paused at its start. */
   readonly session: string;
+  /** Name of the browser. */
+  readonly browser: BrowserName;
   /**
    * Open a window at `address`, relative to the page of the test's session. Windows of a test share their storage. An
    * error in a page fails the test.
@@ -44,40 +44,16 @@ export interface WebDriverFixture {
   open(address?: string): Promise<BrowserWindow>;
   /** Open the browser's session of the present test with other options. */
   useSession(options: SessionOptions): Promise<void>;
+  /** In the present test, call `remove` in every page and worker before their scripts: it takes features away. */
+  removeFeatures(remove: () => void): void;
+  /** Play the test's session. */
+  play(): Promise<void>;
   /** Return the folder of the downloads. */
   downloads(): string;
   state(): Promise<SessionState>;
   /** Publish a page on a site that may embed the server's stages, and return its URL. */
   publish(html: string): Promise<string>;
 }
-
-/** In the page, before its scripts: collect its errors in `window.pageErrors`. */
-function collectErrors(): void {
-  const pageErrors: string[] = [];
-  Object.assign(window, { pageErrors });
-  addEventListener(
-    "error",
-    ({ message, target }) => {
-      // A hint that was of no use is no error.
-      if (target instanceof HTMLLinkElement && target.rel === "modulepreload") return;
-      pageErrors.push(message ?? `not loaded: ${(target as Element | null)?.outerHTML}`);
-    },
-    true,
-  );
-  addEventListener("unhandledrejection", ({ reason }) => pageErrors.push(`unhandled: ${reason}`));
-  addEventListener("securitypolicyviolation", ({ violatedDirective, blockedURI }) =>
-    pageErrors.push(`blocked by ${violatedDirective}: ${blockedURI}`),
-  );
-  const write = console.error;
-  console.error = (...values: unknown[]) => {
-    pageErrors.push(values.map(String).join(" "));
-    write.apply(console, values);
-  };
-}
-
-const SLOW_DISPLAY = `(${slowDownDisplay})(${FRAME_INTERVAL_MS});`;
-/** Scripts that run before those of each page and worker. Errors of a worker are reported by its page. */
-const PROBES = { page: `(${collectErrors})(); ${SLOW_DISPLAY}`, worker: SLOW_DISPLAY };
 
 /** Define a suite for a browser. Where the browser is not installed, it is skipped with a warning; in CI it fails. */
 export function describeInWebDriver(name: BrowserName, defineTests: (fixture: WebDriverFixture) => void): void {
@@ -94,10 +70,11 @@ export function describeInWebDriver(name: BrowserName, defineTests: (fixture: We
     let browser: Browser;
     let browserSession: BrowserSession | null = null;
     let session = "";
+    let probes = createProbes(() => undefined);
 
     beforeAll(async () => {
-      server = await getShared<SharedServer>("/server?kind=open");
-      proxy = await startProbeProxy(server.url, PROBES);
+      server = await getShared<SharedServer>("/server?kind=patient");
+      proxy = await startProbeProxy(server.url, () => probes);
       browser = await start(findProgram(programs[0]) ?? "");
     }, 4 * WAIT_TIMEOUT_MS);
     afterAll(async () => {
@@ -107,6 +84,7 @@ export function describeInWebDriver(name: BrowserName, defineTests: (fixture: We
     beforeEach(async () => {
       session = (await request<{ id: string }>("POST", "/v1/sessions", { motion: server.motion })).id;
       await request("PATCH", `/v1/sessions/${session}`, { playing: false, position: 0 });
+      probes = createProbes(() => undefined);
     });
 
     async function request<T>(method: string, path: string, body?: unknown): Promise<T> {
@@ -125,12 +103,13 @@ export function describeInWebDriver(name: BrowserName, defineTests: (fixture: We
       onTestFinished(async () => {
         browserSession = null;
         await opened.close();
-        expect(opened.errors).toEqual([]);
+        expect(opened.errors.join("\n"), "errors on the console").toBe("");
       });
       return opened;
     }
 
     defineTests({
+      browser: name,
       get url() {
         return proxy.url;
       },
@@ -143,17 +122,19 @@ export function describeInWebDriver(name: BrowserName, defineTests: (fixture: We
           url.searchParams.set("session", session);
         const window = await (browserSession ?? (await useSession({}))).open(url.href, WINDOW_SIZE);
         onTestFinished(async () => {
-          const errors = await evaluate(window, () => (globalThis as unknown as { pageErrors: string[] }).pageErrors);
-          expect(errors).toEqual([]);
+          const errors = await evaluate(window, () => globalThis.window.probe.errors);
+          expect(errors.join("\n"), "errors of the page").toBe("");
         });
         return window;
       },
       useSession: async (options) => void (await useSession(options)),
+      removeFeatures: (remove) => void (probes = createProbes(remove)),
+      play: () => request("PATCH", `/v1/sessions/${session}`, { playing: true }),
       downloads: () => browserSession?.downloads ?? "",
       state: () => request("GET", `/v1/sessions/${session}`),
       async publish(html) {
         const path = `/${randomUUID()}`;
-        await fetch(server.site.origin + path, { method: "PUT", body: `<script>${PROBES.page}</script>${html}` });
+        await fetch(server.site.origin + path, { method: "PUT", body: `<script>${probes.page}</script>${html}` });
         return server.site.origin + path;
       },
     });

@@ -3,14 +3,16 @@ import type { ChildProcess } from "node:child_process";
 import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import type { WindowSize } from "./browser";
 import {
   type Browser,
   type BrowserSession,
   type BrowserWindow,
   COMMAND_TIMEOUT_MS,
+  type InputDevice,
+  type PointerAction,
   type SessionOptions,
   WAIT_TIMEOUT_MS,
+  type WindowSize,
 } from "./browser";
 import { findFreePort, startProcess, startVirtualDisplay, stopProcess, type VirtualDisplay } from "./processes";
 
@@ -63,6 +65,7 @@ async function waitForDriver(driver: ChildProcess, url: string): Promise<void> {
   throw new Error(`WebKitWebDriver does not answer at ${url} (exit code ${driver.exitCode})`);
 }
 
+/** Each session is a browser of its own whose windows are private. */
 class WebKit implements Browser {
   constructor(
     private readonly url: string,
@@ -105,6 +108,37 @@ class WebKit implements Browser {
   }
 }
 
+/**
+ * In the page: dispatch the events of touches. WebKitWebDriver 2.50 accepts the actions of a touch but never answers.
+ */
+function dispatchTouches(json: string): void {
+  const place = ((globalThis as { lastTouch?: { x: number; y: number; target: Element | null } }).lastTouch ??= {
+    x: 0,
+    y: 0,
+    target: null,
+  });
+  for (const action of JSON.parse(json) as PointerAction[]) {
+    if (action.type === "pointerMove") Object.assign(place, { x: action.x, y: action.y });
+    if (action.type === "pointerDown") place.target = document.elementFromPoint(place.x, place.y);
+    place.target?.dispatchEvent(
+      new PointerEvent(action.type.toLowerCase(), {
+        pointerType: "touch",
+        // The mouse's, since an element can only capture a pointer that exists.
+        pointerId: 1,
+        isPrimary: true,
+        button: action.type === "pointerMove" ? -1 : 0,
+        buttons: action.type === "pointerUp" ? 0 : 1,
+        clientX: place.x,
+        clientY: place.y,
+        bubbles: true,
+        cancelable: true,
+        composed: true,
+      }),
+    );
+    if (action.type === "pointerUp") place.target = null;
+  }
+}
+
 class WebKitWindow implements BrowserWindow {
   constructor(
     private readonly session: string,
@@ -123,8 +157,12 @@ class WebKitWindow implements BrowserWindow {
     return this.#send("/execute/sync", { script: `return (${declaration})(arguments[0])`, args: [argument] });
   }
 
-  async perform(...actions: unknown[]): Promise<void> {
-    await this.#send("/actions", { actions });
+  async perform(...devices: InputDevice[]): Promise<void> {
+    const touches = devices.flatMap((device) =>
+      device.type === "pointer" && device.parameters.pointerType === "touch" ? device.actions : [],
+    );
+    if (touches.length > 0) await this.call(String(dispatchTouches), JSON.stringify(touches));
+    else await this.#send("/actions", { actions: devices });
   }
 
   async chooseFile(selector: string, path: string): Promise<void> {

@@ -99,7 +99,9 @@ export function createMappingDialog(root: HTMLElement, onChange: (mapping: Mappi
         state,
         pad
           ? translate("{pad} is connected", { pad: pad.id.replace(/\s*\(.*\)$/, "") })
-          : translate("Press any button of a gamepad to connect it"),
+          : "getGamepads" in navigator
+            ? translate("Press any button of a gamepad to connect it")
+            : translate("This browser allows gamepads only on pages with HTTPS"),
       );
       drawing.highlightPressed(pad, mapping.deadZone);
       editor.captureGamepad(pad ? pressedControls(pad, mapping.deadZone) : new Map());
