@@ -17,8 +17,8 @@ export interface SoundState {
 }
 
 /**
- * Viewer whose sound is played. Its events "figure", "tracks" and "timeline" announce another `audio` and changes of the
- * timeline.
+ * Viewer whose sound is played. Its events "figure", "tracks" and "timeline" announce another `audio` and changes of
+ * the timeline.
  */
 export interface SoundSource extends EventTarget {
   /** Packets of the motion's audio track, null if it has none. */

@@ -52,8 +52,8 @@ export class AvatarModel {
   static async parse(bytes: ArrayBuffer, fallbackName: string): Promise<AvatarModel> {
     const { vrm, name, bones } = parseAvatarFile(bytes);
     const loader = new GLTFLoader();
-    // Textures as image elements where there are any: an embedding page's content security policy may allow fetches from
-    // servers alone. Workers fetch their textures from memory, which our own policy allows.
+    // Textures as image elements where there are any: an embedding page's content security policy may allow fetches
+    // from servers alone. Workers fetch their textures from memory, which our own policy allows.
     if (typeof Image !== "undefined")
       loader.register((parser) => {
         parser.textureLoader = new TextureLoader(parser.options.manager);

@@ -64,8 +64,8 @@ export class Engine {
   #lastPosition = NaN;
 
   /**
-   * Call `start` once afterwards. Events are sent by `send`. `driver` is the name of the graphics driver, if it is known
-   * already.
+   * Call `start` once afterwards. Events are sent by `send`. `driver` is the name of the graphics driver, if it is
+   * known already.
    */
   constructor(
     private readonly canvas: StageCanvas,

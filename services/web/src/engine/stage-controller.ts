@@ -1,6 +1,6 @@
 /**
- * Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. It runs in
- * a worker or in the page.
+ * Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. It runs
+ * in a worker or in the page.
  */
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
 import { LimbController } from "../input/limb-controller";

@@ -10,8 +10,8 @@ const KINDS = {
 } as const;
 
 /**
- * Call `send` for every pointer event of `canvas`, which may be anywhere in the page. Movements of a pressed pointer are
- * sent as soon as they arrive, where the browser reports them before its next frame (Pointer Events 3, 4.1.3.2).
+ * Call `send` for every pointer event of `canvas`, which may be anywhere in the page. Movements of a pressed pointer
+ * are sent as soon as they arrive, where the browser reports them before its next frame (Pointer Events 3, 4.1.3.2).
  */
 export function listenToPointer(canvas: HTMLCanvasElement, send: (message: PointerMessage) => void): void {
   const sendAs = (kind: PointerMessage["kind"], event: PointerEvent) => {

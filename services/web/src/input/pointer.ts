@@ -1,4 +1,6 @@
-/** Mouse and touch on the stage: dragging a handle pulls its limb, dragging anything else turns the view. Reads no DOM. */
+/**
+ * Mouse and touch on the stage: dragging a handle pulls its limb, dragging anything else turns the view. Reads no DOM.
+ */
 import { Vector3 } from "three";
 import type { Stage } from "../stage/stage";
 import { limbWithinPerformer, performerOfLimb } from "../wire/limbs";

@@ -22,8 +22,8 @@ export function element<K extends keyof HTMLElementTagNameMap>(
 }
 
 /**
- * Set an attribute, or remove it if the value is `false`, `null` or `undefined`. An unchanged value is not written again:
- * that would cost a style calculation.
+ * Set an attribute, or remove it if the value is `false`, `null` or `undefined`. An unchanged value is not written
+ * again: that would cost a style calculation.
  */
 export function setAttribute(target: Element, name: string, value: string | number | boolean | null | undefined): void {
   const text = value === true ? "" : String(value);

@@ -1,6 +1,6 @@
 /**
- * Lights of the stage as a performer gets them: each as strong, and from the direction, as at the performer's centre. In
- * software rendering, cones and distances for each pixel would take about half of the figure's time.
+ * Lights of the stage as a performer gets them: each as strong, and from the direction, as at the performer's centre.
+ * In software rendering, cones and distances for each pixel would take about half of the figure's time.
  */
 import { type Camera, Color, DirectionalLight, type IUniform, MathUtils, type Scene, SpotLight, Vector3 } from "three";
 

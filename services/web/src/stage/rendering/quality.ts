@@ -43,8 +43,8 @@ const SOFTWARE_TARGET_S = 1 / 30;
 const CLEAN_SCALE = 0.75;
 const CLEAN_TARGET_S = 1 / 25;
 /**
- * Interval of the slowest displays, in seconds: browsers that save energy draw 30 frames per second. A longer one is the
- * machine's.
+ * Interval of the slowest displays, in seconds: browsers that save energy draw 30 frames per second. A longer one is
+ * the machine's.
  */
 const SLOWEST_DISPLAY_S = 1 / 30;
 /** The quality is reduced if the median frame takes longer than this multiple of the target. */

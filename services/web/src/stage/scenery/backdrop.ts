@@ -83,8 +83,8 @@ export function applyLookToBackdrop(uniforms: BackdropUniforms, look: Look): voi
 }
 
 /**
- * GLSL for materials that three.js does not map tones of: `vec3 displayedBackdrop(vec2 at, float blur)`. In the day look it is not tone mapped: the film
- * curve would grey the paper.
+ * GLSL for materials that three.js does not map tones of: `vec3 displayedBackdrop(vec2 at, float blur)`. In the day
+ * look it is not tone mapped: the film curve would grey the paper.
  */
 export const DISPLAYED_BACKDROP_GLSL = /* glsl */ `
 #include <tonemapping_pars_fragment>
@@ -131,7 +131,8 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
     set usesSimpleMaterials(on) {
       mesh.material = on ? simple : detailed;
       mesh.geometry = on ? grid : plane;
-      // The reflection is drawn over it and shows through the floor; without one, it is drawn only where nothing covers it.
+      // The reflection is drawn over it and shows through the floor; without one, it is drawn only where nothing covers
+      // it.
       mesh.renderOrder = on ? 3 : -5;
     },
     dispose() {

@@ -82,7 +82,8 @@ void main() {
   vec3 bounce = vec3(eye.x, -eye.y, eye.z);
   vLanding = vec2(vAt.x, 0.) + bounce.xy * (${BACKDROP_Z_M.toFixed(2)} - vAt.y) / min(bounce.z, -1e-3);
   float fresnel = .05 + .95 * pow(1. - abs(eye.y), 5.);
-  vec3 wood = colour * (RECIPROCAL_PI * irradiance(seen.xyz, normalize(normalMatrix * normal)) + ambient) * mix(1., mix(.35, 1., exp(-.28 * dot(vAt, vAt))), dark);
+  vec3 wood = colour * (RECIPROCAL_PI * irradiance(seen.xyz, normalize(normalMatrix * normal)) + ambient)
+    * mix(1., mix(.35, 1., exp(-.28 * dot(vAt, vAt))), dark);
   // Displayed colours have about the roots of linear ones: their squares add up.
   vWood = pow(ACESFilmicToneMapping(wood), vec3(2. / 2.2));
   vMirror = mix(.35 * fresnel, .95 * (.9 * fresnel + .13), dark);

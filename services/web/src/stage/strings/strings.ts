@@ -28,8 +28,8 @@ export interface StringsView {
   /** The camera's right in the world frame. */
   right: Vector3;
   /**
-   * Positions along `right` between which the page leaves the picture uncovered, in metres: bars of handles between them
-   * stay there. Unlimited by default.
+   * Positions along `right` between which the page leaves the picture uncovered, in metres: bars of handles between
+   * them stay there. Unlimited by default.
    */
   sides?: readonly [left: number, right: number];
   /** Distance of the camera as a multiple of what one performer needs. */

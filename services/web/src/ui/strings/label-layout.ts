@@ -107,7 +107,9 @@ function positionOf({ left, top }: ScreenBox, form: number): LabelPosition {
   return { form, left: Math.round(left * 10) / 10, top: Math.round(top * 10) / 10 };
 }
 
-/** Return the sides of a hand at `point`, the best first: towards the performer, whose face is nearest, is the worst. */
+/**
+ * Return the sides of a hand at `point`, the best first: towards the performer, whose face is nearest, is the worst.
+ */
 function sidesAwayFrom(faces: readonly ScreenBox[], { x }: ScreenPosition): readonly Side[] {
   const offsets = faces.map(({ left, right }) => x - (left + right) / 2);
   const nearest = offsets.sort((a, b) => Math.abs(a) - Math.abs(b))[0] ?? 0;
