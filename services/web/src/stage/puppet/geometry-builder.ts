@@ -2,7 +2,7 @@
 import { BufferGeometry, Color, Float32BufferAttribute, Uint16BufferAttribute, Vector3 } from "three";
 import { type Finish, PATTERN } from "./finish";
 import { HEAD_CENTRE } from "./standard-figure";
-import type { Surface } from "./surface";
+import type { Detail, Surface, SurfaceMesh } from "./surface";
 
 /** Bones of a vertex by its position on the standard figure. Weights need not sum to one. */
 export type VertexWeights = (at: Vector3) => readonly (readonly [bone: string, weight: number])[];
@@ -15,15 +15,10 @@ const FACE_WINDOW_M = [0.2, 0.26] as const;
 const HEAD_SCALE = 1.07;
 const CHIN_OFFSET_M = 0.11;
 
-/** Mesh of a puppet, and one with fewer triangles over the same vertices, for software rendering. */
-export interface PuppetGeometry {
-  readonly detailed: BufferGeometry;
-  readonly coarse: BufferGeometry;
-}
-
 export class GeometryBuilder {
   readonly #bones: ReadonlyMap<string, number>;
   readonly #fit: FitVertex;
+  readonly #detail: Detail;
   readonly #positions: number[] = [];
   readonly #normals: number[] = [];
   readonly #colours: number[] = [];
@@ -32,16 +27,17 @@ export class GeometryBuilder {
   readonly #skinIndices: number[] = [];
   readonly #skinWeights: number[] = [];
   readonly #indices: number[] = [];
-  readonly #coarseIndices: number[] = [];
 
-  constructor(bones: readonly string[], fit: FitVertex) {
+  constructor(bones: readonly string[], fit: FitVertex, detail: Detail) {
     this.#bones = new Map(bones.map((name, index) => [name, index]));
     this.#fit = fit;
+    this.#detail = detail;
   }
 
   /** Add a part on one bone, or on several by weights. `facesInward` turns a lining's faces to the inside. */
   add(surface: Surface, bones: string | VertexWeights, finish: Finish, facesInward = false): void {
-    orientOutward(surface, facesInward);
+    const mesh = surface(this.#detail);
+    orientOutward(mesh, facesInward);
     const first = this.#positions.length / 3;
     const colour = new Color(finish.colour);
     const pattern = finish.pattern ?? PATTERN.plain;
@@ -49,9 +45,9 @@ export class GeometryBuilder {
     const normal = new Vector3();
     const weightsAt: VertexWeights =
       typeof bones === "string" ? rigidWeights(bones) : (at) => normaliseWeights(bones(at));
-    for (let i = 0; i < surface.positions.length / 3; i++) {
-      position.fromArray(surface.positions, i * 3);
-      normal.fromArray(surface.normals, i * 3);
+    for (let i = 0; i < mesh.positions.length / 3; i++) {
+      position.fromArray(mesh.positions, i * 3);
+      normal.fromArray(mesh.normals, i * 3);
       const weights = weightsAt(position);
       if (pattern === PATTERN.face) {
         const y = (position.y - HEAD_CENTRE.y + CHIN_OFFSET_M) / HEAD_SCALE - CHIN_OFFSET_M;
@@ -61,7 +57,7 @@ export class GeometryBuilder {
           pattern,
         );
       } else {
-        this.#patterns.push(surface.uvs[i * 2], surface.uvs[i * 2 + 1], pattern);
+        this.#patterns.push(mesh.uvs[i * 2], mesh.uvs[i * 2 + 1], pattern);
       }
       this.#fit(position, normal, weights);
       this.#positions.push(position.x, position.y, position.z);
@@ -74,15 +70,14 @@ export class GeometryBuilder {
         this.#skinWeights.push(bone ? bone[1] : 0);
       }
     }
-    for (const index of surface.indices) this.#indices.push(index + first);
-    for (const index of surface.coarseIndices) this.#coarseIndices.push(index + first);
+    for (const index of mesh.indices) this.#indices.push(index + first);
   }
 
   /**
    * Return the geometry of all parts, with attributes `finish` (roughness, metalness, clearcoat, wood) and `pattern`
-   * (u, v, kind), and the coarse one, which shares them.
+   * (u, v, kind).
    */
-  build(): PuppetGeometry {
+  build(): BufferGeometry {
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(this.#positions, 3));
     geometry.setAttribute("normal", new Float32BufferAttribute(this.#normals, 3));
@@ -91,11 +86,8 @@ export class GeometryBuilder {
     geometry.setAttribute("pattern", new Float32BufferAttribute(this.#patterns, 3));
     geometry.setAttribute("skinIndex", new Uint16BufferAttribute(this.#skinIndices, 4));
     geometry.setAttribute("skinWeight", new Float32BufferAttribute(this.#skinWeights, 4));
-    const coarse = new BufferGeometry();
-    for (const [name, values] of Object.entries(geometry.attributes)) coarse.setAttribute(name, values);
     geometry.setIndex(this.#indices);
-    coarse.setIndex(this.#coarseIndices);
-    return { detailed: geometry, coarse };
+    return geometry;
   }
 
   #boneIndex(bone: string): number {
@@ -117,8 +109,7 @@ function normaliseWeights(weights: readonly (readonly [string, number])[]): (rea
 }
 
 /** Wind triangles outwards (by signed volume about the centroid) and make the normals agree. */
-function orientOutward(surface: Surface, facesInward: boolean): void {
-  const { positions, normals, indices } = surface;
+function orientOutward({ positions, normals, indices }: SurfaceMesh, facesInward: boolean): void {
   const centre = new Vector3();
   for (let i = 0; i < positions.length; i += 3) centre.add(new Vector3().fromArray(positions, i));
   centre.divideScalar(positions.length / 3);
@@ -134,8 +125,6 @@ function orientOutward(surface: Surface, facesInward: boolean): void {
     agreement += face.dot(n.fromArray(normals, indices[i] * 3));
   }
   const flip = volume > 0 === facesInward;
-  if (flip)
-    for (const list of [indices, surface.coarseIndices])
-      for (let i = 0; i < list.length; i += 3) [list[i], list[i + 1]] = [list[i + 1], list[i]];
+  if (flip) for (let i = 0; i < indices.length; i += 3) [indices[i], indices[i + 1]] = [indices[i + 1], indices[i]];
   if (agreement > 0 === flip) for (let i = 0; i < normals.length; i++) normals[i] = -normals[i];
 }

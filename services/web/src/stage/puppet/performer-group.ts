@@ -122,7 +122,7 @@ export class PerformerGroup {
 
   #createPuppet(figure: Figure): Puppet {
     this.#assets ??= new PuppetAssets({ face: createFaceTexture(), asanoha: createAsanohaTexture() }, this.floorHeight);
-    return new Puppet(figure, this.#assets);
+    return new Puppet(figure, this.#assets, this.#usesSimpleMaterials);
   }
 
   #applyQuality(performer: Performer): void {

@@ -1,5 +1,6 @@
 /** Shared assets of the puppets of one stage: materials for all, one mesh for equal limb lengths. */
 import {
+  type BufferGeometry,
   type Camera,
   type IUniform,
   type Material,
@@ -11,7 +12,7 @@ import {
 import { type Figure, figureKey, JOINTS } from "../../motion/skeleton";
 import { type DistantLights, updateDistantLights } from "./distant-lights";
 import { fitToFigure } from "./figure-fit";
-import { GeometryBuilder, type PuppetGeometry } from "./geometry-builder";
+import { GeometryBuilder } from "./geometry-builder";
 import { createFigureMaterial, createSimpleFigureMaterial, type PuppetTextures } from "./material";
 import { addArms } from "./parts/arms";
 import { addBodice } from "./parts/bodice";
@@ -19,6 +20,7 @@ import { addHakama } from "./parts/hakama";
 import { addHead } from "./parts/head";
 import { addLegs } from "./parts/legs";
 import { addSleeves } from "./parts/sleeves";
+import type { Detail } from "./surface";
 
 /** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
 export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
@@ -26,8 +28,8 @@ export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
 const centre = new Vector3();
 
 /** Build all parts on a figure in its rest pose. Needs no graphics context. */
-export function buildPuppetGeometry(figure: Figure): PuppetGeometry {
-  const builder = new GeometryBuilder(BONES, fitToFigure(figure));
+export function buildPuppetGeometry(figure: Figure, detail: Detail): BufferGeometry {
+  const builder = new GeometryBuilder(BONES, fitToFigure(figure), detail);
   for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(builder);
   return builder.build();
 }
@@ -38,7 +40,8 @@ export class PuppetAssets {
   readonly mirroredMaterial: Material;
   readonly #textures: PuppetTextures;
   #simpleMaterial: ShaderMaterial | null = null;
-  readonly #geometries = new Map<string, PuppetGeometry>();
+  /** Meshes by the limb lengths of their figure. */
+  readonly #geometries = new Map<string, Map<Detail, BufferGeometry>>();
 
   /** `floorAt` is the height of the reflecting floor. */
   constructor(textures: PuppetTextures, floorHeight: IUniform<number>) {
@@ -64,21 +67,22 @@ export class PuppetAssets {
     this.#simpleMaterial.uniformsNeedUpdate = true;
   }
 
-  /** Return the meshes for a figure, built once per set of limb lengths. */
-  geometryFor(figure: Figure): PuppetGeometry {
+  /** Return the mesh for a figure, built once per set of limb lengths. */
+  geometryFor(figure: Figure, detail: Detail): BufferGeometry {
     const key = figureKey(figure);
-    let geometry = this.#geometries.get(key);
-    if (!geometry) this.#geometries.set(key, (geometry = buildPuppetGeometry(figure)));
+    const ofFigure = this.#geometries.get(key) ?? new Map<Detail, BufferGeometry>();
+    this.#geometries.set(key, ofFigure);
+    const geometry = ofFigure.get(detail) ?? buildPuppetGeometry(figure, detail);
+    ofFigure.set(detail, geometry);
     return geometry;
   }
 
   /** Dispose of the meshes of all other figures. */
   retainOnly(figures: readonly Figure[]): void {
     const keysToKeep = new Set(figures.map(figureKey));
-    for (const [key, geometry] of this.#geometries) {
+    for (const [key, ofFigure] of this.#geometries) {
       if (keysToKeep.has(key)) continue;
-      geometry.detailed.dispose();
-      geometry.coarse.dispose();
+      for (const geometry of ofFigure.values()) geometry.dispose();
       this.#geometries.delete(key);
     }
   }

@@ -1,7 +1,7 @@
 /** The puppet: bones named like the H-Anim joints, one skinned mesh, and a reflection in the night look. */
 import {
   Bone,
-  type BufferGeometry,
+  BufferGeometry,
   Group,
   type Material,
   Matrix4,
@@ -12,7 +12,6 @@ import {
 } from "three";
 import { type Figure, JOINTS, PARENTS, type Pose } from "../../motion/skeleton";
 import { figureScale, restPositions } from "./figure-fit";
-import type { PuppetGeometry } from "./geometry-builder";
 import { floorHeight, handlePosition, type Performer } from "./performer";
 import { BONES, type PuppetAssets } from "./puppet-assets";
 import { SleeveBone } from "./sleeve-bone";
@@ -27,11 +26,10 @@ export class Puppet implements Performer {
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
   readonly #assets: PuppetAssets;
-  readonly #geometry: PuppetGeometry;
   readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
   readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
 
-  constructor(figure: Figure, assets: PuppetAssets) {
+  constructor(figure: Figure, assets: PuppetAssets, usesSimpleMaterials = false) {
     this.figure = figure;
     this.#assets = assets;
     this.scale = figureScale(figure);
@@ -41,13 +39,11 @@ export class Puppet implements Performer {
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
     this.group.updateMatrixWorld(true);
     const skeleton = new Skeleton(this.#bones);
-    this.#geometry = assets.geometryFor(figure);
-    const { detailed } = this.#geometry;
-    this.#mesh = new SkinnedMesh(detailed, assets.material);
+    this.#mesh = new SkinnedMesh(new BufferGeometry(), assets.material);
     this.#mesh.name = "figure";
     this.#mesh.castShadow = true;
     this.#mesh.receiveShadow = true;
-    this.#reflection = new SkinnedMesh(detailed, assets.mirroredMaterial);
+    this.#reflection = new SkinnedMesh(new BufferGeometry(), assets.mirroredMaterial);
     this.#reflection.renderOrder = -1;
     for (const mesh of [this.#mesh, this.#reflection]) {
       mesh.bind(skeleton, new Matrix4());
@@ -55,6 +51,7 @@ export class Puppet implements Performer {
       // Without a bounding sphere three.js skins the whole mesh to find its depth for sorting.
       mesh.boundingSphere = new Sphere();
     }
+    this.usesSimpleMaterials = usesSimpleMaterials;
     this.#mesh.onBeforeRender = (_renderer, scene, camera) => assets.lightSimpleMaterial(scene, camera, this.root);
     this.group.add(this.#mesh);
     const rest = restPositions(figure);
@@ -85,7 +82,8 @@ export class Puppet implements Performer {
 
   set usesSimpleMaterials(on: boolean) {
     this.#mesh.material = on ? this.#assets.simpleMaterial : this.#assets.material;
-    this.#mesh.geometry = on ? this.#geometry.coarse : this.#geometry.detailed;
+    const geometry = this.#assets.geometryFor(this.figure, on ? "coarse" : "full");
+    this.#mesh.geometry = this.#reflection.geometry = geometry;
   }
 
   apply(pose: Pose, seconds: number): void {

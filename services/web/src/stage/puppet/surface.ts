@@ -1,24 +1,26 @@
-/** Parametric surfaces as vertex lists, from which all parts of the puppet are made. Metres. */
+/** Parametric surfaces, from which all parts of the puppet are made. Metres. */
 import { CatmullRomCurve3, Quaternion, Vector3 } from "three";
 
-/**
- * Vertices and triangles of a part: three numbers per vertex, two for `uvs`; triangles in `indices`, and fewer of them
- * over the same vertices in `coarseIndices`, for software rendering.
- */
-export interface Surface {
+/** How finely a surface is sampled: coarsely, with about a third of the triangles, for software rendering. */
+export type Detail = "full" | "coarse";
+
+/** Vertices and triangles of a part: three numbers per vertex, two for `uvs`. */
+export interface SurfaceMesh {
   positions: number[];
   normals: number[];
   uvs: number[];
   indices: number[];
-  coarseIndices: number[];
 }
+
+/** Return a new mesh of a surface. */
+export type Surface = (detail: Detail) => SurfaceMesh;
 
 export type SurfaceFunction = (u: number, v: number) => Vector3;
 export type UvFunction = (u: number, v: number, at: Vector3) => readonly [number, number];
 
 const DOWN = new Vector3(0, -1, 0);
 const DERIVATIVE_STEP = 1e-3;
-/** Grids with fewer cells across and along keep them all in their coarse triangles. */
+/** Grids with fewer cells across and along keep them all in their coarse meshes. */
 const MIN_COARSE_COLUMNS = 12;
 const MIN_COARSE_ROWS = 6;
 
@@ -65,45 +67,42 @@ export function curve(keys: readonly (readonly number[])[]): (t: number) => read
  * surface, so that a seam (u = 0 and u = 1) shades evenly; `at` must accept u slightly outside 0..1.
  */
 export function grid(at: SurfaceFunction, columns: number, rows: number, uv?: UvFunction): Surface {
-  const surface: Surface = { positions: [], normals: [], uvs: [], indices: [], coarseIndices: [] };
-  for (let j = 0; j <= rows; j++) {
-    for (let i = 0; i <= columns; i++) {
-      const u = i / columns;
-      const v = j / rows;
-      const point = at(u, v);
-      let normal = surfaceNormal(at, u, v);
-      // At a pole the tangent vanishes: take the normal a little further in.
-      if (normal.lengthSq() < 1e-16) normal = surfaceNormal(at, u, v < 0.5 ? v + 0.02 : v - 0.02);
-      normal.normalize();
-      surface.positions.push(point.x, point.y, point.z);
-      surface.normals.push(normal.x, normal.y, normal.z);
-      surface.uvs.push(...(uv ? uv(u, v, point) : [u, v]));
+  return (detail) => {
+    const isCoarse = detail === "coarse";
+    const across = sample(columns, isCoarse && columns >= MIN_COARSE_COLUMNS ? 2 : 1);
+    const along = sample(rows, isCoarse && rows >= MIN_COARSE_ROWS ? 2 : 1);
+    const mesh: SurfaceMesh = { positions: [], normals: [], uvs: [], indices: [] };
+    for (const v of along)
+      for (const u of across) {
+        const point = at(u, v);
+        let normal = surfaceNormal(at, u, v);
+        // At a pole the tangent vanishes: take the normal a little further in.
+        if (normal.lengthSq() < 1e-16) normal = surfaceNormal(at, u, v < 0.5 ? v + 0.02 : v - 0.02);
+        normal.normalize();
+        mesh.positions.push(point.x, point.y, point.z);
+        mesh.normals.push(normal.x, normal.y, normal.z);
+        mesh.uvs.push(...(uv ? uv(u, v, point) : [u, v]));
+      }
+    mesh.indices = triangulate(across.length, along.length);
+    return mesh;
+  };
+}
+
+/** Return the positions (0..1) of every `step`th line of a grid of `cells`, and of the last. */
+function sample(cells: number, step: number): number[] {
+  return [...Array.from({ length: Math.ceil(cells / step) }, (_, at) => (at * step) / cells), 1];
+}
+
+/** Return the triangles of a grid of `columns` x `rows` vertices. */
+function triangulate(columns: number, rows: number): number[] {
+  const indices: number[] = [];
+  for (let j = 1; j < rows; j++)
+    for (let i = 1; i < columns; i++) {
+      const d = j * columns + i;
+      const [a, b, c] = [d - columns - 1, d - columns, d - 1];
+      indices.push(a, b, c, b, d, c);
     }
-  }
-  surface.indices = triangulate(columns, lines(columns, 1), lines(rows, 1));
-  surface.coarseIndices = triangulate(
-    columns,
-    lines(columns, columns >= MIN_COARSE_COLUMNS ? 2 : 1),
-    lines(rows, rows >= MIN_COARSE_ROWS ? 2 : 1),
-  );
-  return surface;
-}
-
-/** Return the numbers of every `step`th line of a grid of `cells`, and of the last. */
-function lines(cells: number, step: number): number[] {
-  return [...Array.from({ length: Math.ceil(cells / step) }, (_, at) => at * step), cells];
-}
-
-/** Return the triangles between these columns and rows of a grid that is `columns` cells wide. */
-function triangulate(columns: number, across: readonly number[], along: readonly number[]): number[] {
-  const vertex = (column: number, row: number) => row * (columns + 1) + column;
-  return along.slice(1).flatMap((nextRow, j) =>
-    across.slice(1).flatMap((nextColumn, i) => {
-      const [a, b] = [vertex(across[i], along[j]), vertex(nextColumn, along[j])];
-      const [c, d] = [vertex(across[i], nextRow), vertex(nextColumn, nextRow)];
-      return [a, b, c, b, d, c];
-    }),
-  );
+  return indices;
 }
 
 function surfaceNormal(at: SurfaceFunction, u: number, v: number): Vector3 {
@@ -260,11 +259,14 @@ export function tube(
 
 /** Return a flat-faced box rotated about z: knots and bows of stiff cloth. */
 export function box(centre: Vector3, size: readonly [number, number, number], turnZ: number): Surface {
-  const surface: Surface = { positions: [], normals: [], uvs: [], indices: [], coarseIndices: [] };
-  const turn = new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), turnZ);
+  return () => boxMesh(centre, size, new Quaternion().setFromAxisAngle(new Vector3(0, 0, 1), turnZ));
+}
+
+function boxMesh(centre: Vector3, size: readonly [number, number, number], turn: Quaternion): SurfaceMesh {
+  const mesh: SurfaceMesh = { positions: [], normals: [], uvs: [], indices: [] };
   for (let axis = 0; axis < 3; axis++) {
     for (const sign of [1, -1]) {
-      const first = surface.positions.length / 3;
+      const first = mesh.positions.length / 3;
       const normal = new Vector3().setComponent(axis, sign).applyQuaternion(turn);
       for (const [a, b] of [
         [-1, -1],
@@ -276,14 +278,13 @@ export function box(centre: Vector3, size: readonly [number, number, number], tu
         corner.setComponent((axis + 1) % 3, a * size[(axis + 1) % 3] * 0.5);
         corner.setComponent((axis + 2) % 3, b * size[(axis + 2) % 3] * 0.5);
         corner.applyQuaternion(turn).add(centre);
-        surface.positions.push(corner.x, corner.y, corner.z);
-        surface.normals.push(normal.x, normal.y, normal.z);
-        surface.uvs.push((a + 1) / 2, (b + 1) / 2);
+        mesh.positions.push(corner.x, corner.y, corner.z);
+        mesh.normals.push(normal.x, normal.y, normal.z);
+        mesh.uvs.push((a + 1) / 2, (b + 1) / 2);
       }
       const [a, b, c, d] = sign > 0 ? [0, 1, 2, 3] : [3, 2, 1, 0];
-      surface.indices.push(first + a, first + b, first + c, first + a, first + c, first + d);
+      mesh.indices.push(first + a, first + b, first + c, first + a, first + c, first + d);
     }
   }
-  surface.coarseIndices = [...surface.indices];
-  return surface;
+  return mesh;
 }

@@ -56,7 +56,8 @@ function createGeometry(): BufferGeometry {
     [hook, "#d2a656"],
   ];
   const [positions, normals, colours, indices]: number[][] = [[], [], [], []];
-  for (const [part, hex] of parts) {
+  for (const [surface, hex] of parts) {
+    const part = surface("full");
     const first = positions.length / 3;
     const { r, g, b } = new Color(hex);
     positions.push(...part.positions);

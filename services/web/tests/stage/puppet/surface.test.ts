@@ -4,7 +4,8 @@ import { describe, expect, test } from "vitest";
 import { ball, box, curve, lathe, type Surface, smoothStep } from "../../../src/stage/puppet/surface";
 
 /** Return the signed volume: positive if triangles wind outwards. */
-function volume({ positions, indices }: Surface): number {
+function volume(surface: Surface): number {
+  const { positions, indices } = surface("full");
   const at = (i: number) => new Vector3().fromArray(positions, i * 3);
   let sum = 0;
   for (let i = 0; i < indices.length; i += 3) sum += at(indices[i]).dot(at(indices[i + 1]).cross(at(indices[i + 2])));
@@ -52,7 +53,7 @@ describe("surfaces", () => {
   });
 
   test("normals of a ball are radial", () => {
-    const { positions, normals } = ball(new Vector3(), 1);
+    const { positions, normals } = ball(new Vector3(), 1)("full");
     for (let i = 0; i < positions.length; i += 3) {
       const along = positions[i] * normals[i] + positions[i + 1] * normals[i + 1] + positions[i + 2] * normals[i + 2];
       expect(Math.abs(along)).toBeGreaterThan(0.96);

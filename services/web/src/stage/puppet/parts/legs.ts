@@ -104,11 +104,15 @@ export function addLegs(builder: GeometryBuilder): void {
 
     builder.add(lathe(hipAt, kneeAt, THIGH, { widthScale: 0.98, depthScale: 1.02 }), hip, FINISH.limb);
     builder.add(ball(kneeAt, 0.0415, [0.96, 1, 1], 14), hip, FINISH.jointBall);
-    const calf = lathe(kneeAt, ankleAt, SHIN, { widthScale: 0.94, depthScale: 1.06 });
-    for (let i = 0; i < calf.positions.length; i += 3) {
-      const t = (kneeAt.y - calf.positions[i + 1]) / (kneeAt.y - ankleAt.y);
-      calf.positions[i + 2] -= 0.014 * Math.exp(-(((t - 0.33) / 0.2) ** 2));
-    }
+    const straight = lathe(kneeAt, ankleAt, SHIN, { widthScale: 0.94, depthScale: 1.06 });
+    const calf: Surface = (detail) => {
+      const mesh = straight(detail);
+      for (let i = 0; i < mesh.positions.length; i += 3) {
+        const t = (kneeAt.y - mesh.positions[i + 1]) / (kneeAt.y - ankleAt.y);
+        mesh.positions[i + 2] -= 0.014 * Math.exp(-(((t - 0.33) / 0.2) ** 2));
+      }
+      return mesh;
+    };
     builder.add(calf, knee, FINISH.limb);
     builder.add(ball(ankleAt, 0.029, [1, 1, 1], 10), knee, FINISH.jointBall);
     builder.add(ring(hipAt.clone().lerp(kneeAt, 0.899), thighAxis, 0.094 * thigh, 0.003), hip, FINISH.gold);
