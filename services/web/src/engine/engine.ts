@@ -269,14 +269,19 @@ export class Engine {
     if (!controller || !this.#describeStage) return;
     const now = performance.now();
     const frame = controller.draw(now, this.#settings.focusedLimb);
-    const state = this.#describeStage(controller, frame, this.#labels, now);
+    // What lies over the stage moves with what the canvas shows.
+    if (controller.stage.isUpToDate) this.#sendFrame(this.#describeStage(controller, frame, this.#labels, now), now);
+    this.#playback?.viewer.recordFrame(performance.now() - now);
+  }
+
+  /** Send what has changed since the last frame. */
+  #sendFrame(state: StageState, now: number): void {
     const changes = changedParts(this.#lastState, state);
     const time = this.#viewerTime(now);
     const position = time?.position ?? NaN;
     if (changes || !Object.is(position, this.#lastPosition))
       this.send({ type: "frame", changes, playback: this.#playbackNumber, time });
     [this.#lastState, this.#lastPosition] = [state, position];
-    this.#playback?.viewer.recordFrame(performance.now() - now);
   }
 
   /** Return the viewer's time at local `now`; null before the server has sent its own. */

@@ -66,6 +66,7 @@ export class Stage {
   #appliedQuality: Quality | null = null;
   #emptyS = 0;
   #drawnHandles: readonly (ScreenPosition | null)[] = [];
+  #isUpToDate = false;
   /** Progress of the first frame with a performer. */
   #firstFrame: "pending" | "submitted" | "complete" = "pending";
 
@@ -88,6 +89,11 @@ export class Stage {
   /** True if the graphics processor has completed a frame with a performer. */
   get hasDrawnPerformer(): boolean {
     return this.#firstFrame === "complete";
+  }
+
+  /** True if the canvas shows the state of the last call of `draw`; false while an earlier frame is still drawn. */
+  get isUpToDate(): boolean {
+    return this.#isUpToDate;
   }
 
   /** Performers in the order of the motion's tracks. */
@@ -233,6 +239,7 @@ export class Stage {
       ...rig.floorOffset,
       this.#floorHeight.value,
     ]);
+    this.#isUpToDate = !isOutdated;
     if (!this.#frameRenderer.isReady) return;
     if (this.#firstFrame === "submitted") this.#firstFrame = "complete";
     if (!isOutdated || (!hasPose && (this.#emptyS += seconds) < EMPTY_STAGE_DELAY_S)) return;
@@ -241,6 +248,7 @@ export class Stage {
     if (this.#frameRenderer.quality !== this.#appliedQuality) this.#applyQuality();
     this.#scenery.prepare(this.renderer);
     this.#frameRenderer.draw(this.scene, audience.camera, hasPose ? this.#edgeBox : null);
+    this.#isUpToDate = true;
     this.#drawnHandles = this.#performerGroup.handles.map((at) => at && this.toScreen(at));
   }
 

@@ -6,6 +6,8 @@ import { LEFT_HAND, pauseAtStart, ringPosition, waitForFirstPose } from "./page-
 
 /** Callbacks without a frame after which a stage counts as still. */
 const STILL_CALLBACKS = 15;
+/** Callbacks over which the messages to the page are counted. */
+const COUNTED_CALLBACKS = 60;
 
 describeInBrowser("drawing", { server: "open" }, ({ open }) => {
   test("a paused stage is drawn in the best quality, then only when something moves", async () => {
@@ -35,6 +37,37 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
     const ring = await ringPosition(page, LEFT_HAND);
     await page.mouse.move(ring.x, ring.y);
     await waitInEngine(page, (frame) => globalThis.bunraku.stage.renderer.info.render.frame > frame, frame);
+  });
+
+  test("the page is told of a state once the canvas shows it", async () => {
+    const page = await open("", { colorScheme: "dark" });
+    await waitForFirstPose(page);
+    const { shown, told } = await evaluateInEngine(
+      page,
+      (callbacks) =>
+        new Promise<{ shown: number; told: number }>((resolve) => {
+          const { stage } = globalThis.bunraku;
+          const draw = stage.draw.bind(stage);
+          const send = globalThis.postMessage.bind(globalThis);
+          const counts = { shown: 0, told: 0 };
+          globalThis.postMessage = (event: { type?: string }) => {
+            if (event.type === "frame") counts.told++;
+            send(event);
+          };
+          let left = callbacks;
+          stage.draw = (...state) => {
+            if (left-- === 0) {
+              [stage.draw, globalThis.postMessage] = [draw, send];
+              resolve(counts);
+            }
+            draw(...state);
+            if (left >= 0 && stage.isUpToDate) counts.shown++;
+          };
+        }),
+      COUNTED_CALLBACKS,
+    );
+    expect(told).toBeGreaterThan(0);
+    expect(told).toBeLessThanOrEqual(shown);
   });
 
   test("edges are smooth without a graphics processor", async () => {
