@@ -34,23 +34,45 @@ for field in Settings.model_fields:
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
-FIRST_FOLDERS = ("simulation", "attack", "e2e", "faults", "deploy", "fuzz", "session", "http", "client", "messaging")
-"""Folders of the longest test files. They run first, so that at the end no worker waits for a long file."""
+FIRST_PATHS = (
+    "attack/test_attacks.py",
+    "soak/test_soak.py",
+    "simulation",
+    "faults/test_killed_server.py",
+    "faults/test_abandoned_job.py",
+    "deploy/test_nats_cluster.py",
+    "e2e",
+    "faults",
+    "fuzz",
+    "deploy",
+    "marionette/test_merge_model.py",
+    "demo/test_build.py",
+    "session",
+    "ingest",
+    "test_cli.py",
+    "client",
+    "http",
+    "messaging",
+)
+"""Long test files and folders with long ones. They run first, so that at the end no worker waits for a long file."""
 SUMMARY_LINES = pytest.StashKey[list[str]]()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Run long files first, and let a coroutine that hangs fail at its step, before the time-out of pytest."""
-    items.sort(key=lambda item: _folder_rank(item.path))
+    items.sort(key=lambda item: _rank_path(item.path))
     for item in items:
         if isinstance(item, pytest.Function) and inspect.iscoroutinefunction(item.obj):
             item.obj = fail_after(item.obj, COROUTINE_TIMEOUT_S)
 
 
-def _folder_rank(path: Path) -> int:
-    """Return the place of a test file in the order of folders."""
-    folder = path.relative_to(REPOSITORY / "tests").parts[0]
-    return FIRST_FOLDERS.index(folder) if folder in FIRST_FOLDERS else len(FIRST_FOLDERS)
+def _rank_path(path: Path) -> int:
+    """Return the place of a test file in the order of `FIRST_PATHS`: that of the file, or else of its folder."""
+    relative = path.relative_to(REPOSITORY / "tests")
+    for place in (relative.as_posix(), relative.parts[0]):
+        if place in FIRST_PATHS:
+            return FIRST_PATHS.index(place)
+    return len(FIRST_PATHS)
 
 
 def fail_after(test: Callable[..., Awaitable[None]], timeout_s: float) -> Callable[..., Awaitable[None]]:

@@ -150,7 +150,7 @@ async def large_headers_in_one_segment(target: Target, report: Report) -> None:
 
 @attack(19, "400 and the connection is closed", quick=True)
 async def request_smuggling(target: Target, report: Report) -> None:
-    """Send requests whose length is ambiguous, with a second request hidden behind them."""
+    """Send requests whose length is ambiguous, side by side, with a second request hidden behind each."""
     hidden = request(target, "GET", "/v1/openapi.json")
     token = target.tokens["view"]
 
@@ -182,7 +182,8 @@ async def request_smuggling(target: Target, report: Report) -> None:
         "space in a name": post("X Y: a"),
         "two hosts": post("Host: evil.example"),
     }
-    for name, data in variants.items():
+
+    async def run(name: str, data: bytes) -> None:
         async with open_socket(target) as opened:
             await opened.send(data + hidden)
             first = await opened.read_response(ANSWER_TIMEOUT_S)
@@ -197,10 +198,12 @@ async def request_smuggling(target: Target, report: Report) -> None:
             report.require(is_refused or is_cleaned or second is None, f"{name}: {status}, connection kept")
             report.require(status < 500 or is_refused, f"{name}: {status}")
 
+    await asyncio.gather(*(run(*variant) for variant in variants.items()))
+
 
 @attack(19, "no 5xx; the connection is answered or closed", quick=True)
 async def unusual_requests(target: Target, report: Report) -> None:
-    """Send requests that are legal, obsolete or nonsense, one by one."""
+    """Send requests that are legal, obsolete or nonsense, side by side."""
     health = request(target, "GET", "/v1/health")
     chunked = request(target, "POST", "/v1/solve", "Transfer-Encoding: chunked", token=target.tokens["view"])
     variants = {
@@ -256,13 +259,16 @@ async def unusual_requests(target: Target, report: Report) -> None:
         ),
         "many parameters": request(target, "GET", "/v1/motions?" + "a=1&" * 3_000, token=target.tokens["view"]),
     }  # fmt: skip
-    for name, data in variants.items():
+
+    async def run(name: str, data: bytes) -> None:
         async with open_socket(target) as opened:
             await opened.send(data)
             # the server waits for the body of some
             reaction = await opened.describe_reaction(2.0)
             report.count(reaction)
             report.require(not reaction.startswith("5") or reaction in ("501", "505"), f"{name}: {reaction}")
+
+    await asyncio.gather(*(run(*variant) for variant in variants.items()))
 
 
 @attack(3, "others' overlay gap p99 <= 1.3x calm; bounded memory")

@@ -139,30 +139,41 @@ UPGRADE = (
 )
 
 
-@pytest.mark.parametrize(
-    ("data", "status"),
-    [
-        (UPGRADE + b"Content-Length: 10\r\n\r\n", 400),
-        (UPGRADE + b"Transfer-Encoding: chunked\r\n\r\n", 400),
-        (UPGRADE + b"a: b\r\n" * 129 + b"\r\n", 431),
-        (UPGRADE + b"Sec-WebSocket-Protocol: ,,\x7f\r\n\r\n", 400),
-        (UPGRADE + b"a: " + b"b" * 9_000 + b"\r\n\r\n", 431),
-        (UPGRADE.replace(b"none", b"n" * 9_000) + b"\r\n", 414),
-        (UPGRADE + b"\r\n" + b"\x89\x80\0\0\0\0" * 1_000, 400),
-        (UPGRADE.replace(b"Version: 13", b"Version: 12") + b"\r\n", 400),
-        (UPGRADE.replace(b"GET", b"POST") + b"\r\n", 405),
-        (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"a: " + b"b" * 100 + b"\r\n" * 2, 200),
-        (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + (b"a: " + b"b" * 1_000 + b"\r\n") * 120 + b"\r\n", 431),
-        (
-            b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
-            400,
-        ),
-        (b"nonsense\r\n\r\n", 400),
-        (b"POST /v1/solve HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nnonsense\r\n", 400),
-    ],
+MALFORMED_REQUESTS = (
+    (UPGRADE + b"Content-Length: 10\r\n\r\n", 400),
+    (UPGRADE + b"Transfer-Encoding: chunked\r\n\r\n", 400),
+    (UPGRADE + b"a: b\r\n" * 129 + b"\r\n", 431),
+    (UPGRADE + b"Sec-WebSocket-Protocol: ,,\x7f\r\n\r\n", 400),
+    (UPGRADE + b"a: " + b"b" * 9_000 + b"\r\n\r\n", 431),
+    (UPGRADE.replace(b"none", b"n" * 9_000) + b"\r\n", 414),
+    (UPGRADE + b"\r\n" + b"\x89\x80\0\0\0\0" * 1_000, 400),
+    (UPGRADE.replace(b"Version: 13", b"Version: 12") + b"\r\n", 400),
+    (UPGRADE.replace(b"GET", b"POST") + b"\r\n", 405),
+    (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"a: " + b"b" * 100 + b"\r\n" * 2, 200),
+    (b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + (b"a: " + b"b" * 1_000 + b"\r\n") * 120 + b"\r\n", 431),
+    (
+        b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 4\r\nTransfer-Encoding: chunked\r\n\r\n0\r\n\r\n",
+        400,
+    ),
+    (b"nonsense\r\n\r\n", 400),
+    (b"POST /v1/solve HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nnonsense\r\n", 400),
 )
-async def test_malformed_request_is_answered_and_closed(url: str, data: bytes, status: int) -> None:
-    received = await exchange(url, data)
+"""Requests, and the status of the response to each."""
+
+
+@pytest.fixture(scope="module")
+def answers(url: str) -> list[bytes]:
+    """Return the response to each malformed request. The server keeps each connection for a while: all side by side."""
+
+    async def send_all() -> list[bytes]:
+        return await asyncio.gather(*(exchange(url, data) for data, _ in MALFORMED_REQUESTS))
+
+    return asyncio.run(send_all())
+
+
+@pytest.mark.parametrize("number", range(len(MALFORMED_REQUESTS)))
+def test_malformed_request_is_answered_and_closed(answers: list[bytes], number: int) -> None:
+    received, status = answers[number], MALFORMED_REQUESTS[number][1]
     # a connection whose response has begun is aborted
     assert received.startswith(b"HTTP/1.1 %d" % status) or (status == 400 and received == b"")
     if status in (414, 431):

@@ -16,6 +16,7 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.runtime import worker_process
 from bunraku.runtime.worker_message import send_message
 from tests.servers import make_bvh_clip
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
@@ -73,14 +74,18 @@ def report_nonsense(sender: Connection, *_: object) -> None:
 
 
 @pytest.mark.parametrize(
-    ("worker", "title"),
-    [(stop_within_a_message, "Takes too long"), (report_for_ever, "Unreadable"), (report_nonsense, "Unreadable")],
+    ("worker", "timeout_s", "title"),
+    [
+        (stop_within_a_message, 3.0, "Takes too long"),
+        (report_for_ever, HANG_TIMEOUT_S, "Unreadable"),
+        (report_nonsense, HANG_TIMEOUT_S, "Unreadable"),
+    ],
 )
 async def test_hostile_worker_is_a_rejection(
-    worker: Callable[..., None], title: str, monkeypatch: pytest.MonkeyPatch
+    worker: Callable[..., None], timeout_s: float, title: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(worker_process, "_run_worker", worker)
-    result = await job_process.run_job(JobKind.MOTION, ("m1",), 15.0)
+    result = await job_process.run_job(JobKind.MOTION, ("m1",), timeout_s)
     assert isinstance(result, JobRejection)
     assert result.title.startswith(title)
     assert not multiprocessing.active_children()

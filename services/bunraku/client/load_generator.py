@@ -123,7 +123,7 @@ class LoadGenerator:
 
     def statistics(self) -> LoadStatistics:
         """Return the statistics since `reset_statistics`."""
-        shared, seconds = self.state, time.monotonic() - self._measured_from
+        shared, seconds = self.state, max(time.monotonic() - self._measured_from, 1e-6)
         joins = _percentiles(self.join_times, 1e3)
         overlays, blocks = _percentiles(shared.overlay_lateness, 1e-3), _percentiles(shared.block_lateness, 1e-3)
         return LoadStatistics(
@@ -183,7 +183,7 @@ async def run_load(
     token: str | None = None,
     on_progress: Callable[[str, float], None] | None = None,
 ) -> LoadStatistics:
-    """Run a load test of `viewers` on the stream at `url` for `seconds`.
+    """Run a load test of `viewers` on the stream at `url` for `seconds`, or until joining ends if no viewer joined.
 
     `on_progress` receives the stage (`joining`, `watching`) and the share done, 0..1. Raises `FileLimitExceeded`.
     """
@@ -194,7 +194,7 @@ async def run_load(
         )
         generator.reset_statistics()
         end = time.monotonic() + seconds
-        while (left := end - time.monotonic()) > 0:
+        while generator.viewers and (left := end - time.monotonic()) > 0:
             if on_progress is not None:
                 on_progress("watching", 1 - left / seconds)
             await asyncio.sleep(min(left, 0.2))
