@@ -53,10 +53,10 @@ def run_gateway(folder: Path, service_port: int, patch: pytest.MonkeyPatch, **en
 
 
 class RecordingService:
-    """Service that records the head of every request and answers with `response`."""
+    """Service that records the head of every request, and answers with `response` without reading a body."""
 
-    def __init__(self, response: bytes) -> None:
-        self._response = response
+    def __init__(self, response: bytes, status: bytes) -> None:
+        self._response, self._status = response, status
         self.heads: list[bytes] = []
         self.aborted = asyncio.Event()
         self.connections: set[asyncio.Task[None]] = set()
@@ -67,7 +67,8 @@ class RecordingService:
     async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         with suppress(OSError, asyncio.IncompleteReadError):
             self.heads.append(await reader.readuntil(b"\r\n\r\n"))
-            writer.write(b"HTTP/1.1 200 OK\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % len(self._response))
+            length = len(self._response)
+            writer.write(b"HTTP/1.1 %b\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % (self._status, length))
             writer.write(self._response)
             try:
                 await writer.drain()
@@ -77,8 +78,10 @@ class RecordingService:
 
 
 @asynccontextmanager
-async def run_recording_service(response: bytes = b"ok") -> AsyncIterator[tuple[RecordingService, int]]:
-    service = RecordingService(response)
+async def run_recording_service(
+    response: bytes = b"ok", status: bytes = b"200 OK"
+) -> AsyncIterator[tuple[RecordingService, int]]:
+    service = RecordingService(response, status)
     listening = await asyncio.start_server(service.accept, "127.0.0.1", 0)
     try:
         yield service, listening.sockets[0].getsockname()[1]
@@ -117,6 +120,28 @@ async def test_silent_client_is_disconnected(tmp_path: Path, monkeypatch: pytest
     async with run_recording_service() as (_, service_port):
         with run_gateway(tmp_path, service_port, monkeypatch, BUNRAKU_REQUEST_TIMEOUT="1s") as port:
             await asyncio.gather(*(send_and_read(port, data) for data in SILENT_CLIENTS))
+
+
+UPGRADE = b"GET /v1/sessions/a/stream HTTP/1.1\r\nHost: a\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+BODIES_THAT_DO_NOT_ARRIVE = (
+    b"POST /v1/solve HTTP/1.1\r\nHost: a\r\nContent-Length: 100\r\n\r\nx",
+    b"POST /v1/motions HTTP/1.1\r\nHost: a\r\nTransfer-Encoding: chunked\r\n\r\n5\r\nhe",
+    b"DELETE /v1/shares/a HTTP/1.1\r\nHost: a\r\nContent-Length: 9\r\n\r\n",
+    b"GET / HTTP/1.1\r\nHost: a\r\nContent-Length: 9\r\n\r\n",
+    UPGRADE + b"Content-Length: 5\r\n\r\n",
+    UPGRADE + b"Transfer-Encoding: chunked\r\n\r\n",
+)
+
+
+@pytest.mark.parametrize("status", [b"400 Bad Request", b"401 Unauthorized", b"503 Service Unavailable"])
+async def test_rejection_does_not_wait_for_the_body(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, status: bytes
+) -> None:
+    async with run_recording_service(b"no", status) as (_, service_port):
+        with run_gateway(tmp_path, service_port, monkeypatch) as port:
+            for response in await asyncio.gather(*(send_and_read(port, data) for data in BODIES_THAT_DO_NOT_ARRIVE)):
+                assert response.startswith(b"HTTP/1.1 " + status)
+                assert response.endswith(b"\r\n\r\nno")
 
 
 async def test_large_headers_are_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
