@@ -108,6 +108,8 @@ export function definePageCases(fixture: WebDriverFixture): void {
     await waitForStart(window);
     await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
 
+    // The invitation to take a hand, which covers the stage, ends with the first claim.
+    const hand = await findHand(window);
     const held = [];
     for (const key of LIMB_KEYS) {
       // A long press holds the limb while it lasts, a short one until the next.
@@ -122,8 +124,6 @@ export function definePageCases(fixture: WebDriverFixture): void {
     }
     expect(held.sort()).toEqual([0, 1, 2, 3]);
 
-    // The invitation to take a hand, which covers the stage, ended with the first claim.
-    const hand = await findHand(window);
     for (const pointerType of ["mouse", "touch"] as const) await pullHand(window, pointerType, hand);
 
     await evaluate(window, connectGamepad);
