@@ -74,6 +74,10 @@ class RecordingService:
                 await writer.drain()
             except OSError:
                 self.aborted.set()
+            else:
+                # as the services do: closing with unread input would discard the response
+                writer.write_eof()
+                await reader.read()
         writer.close()
 
 
