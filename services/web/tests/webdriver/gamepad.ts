@@ -13,6 +13,8 @@ export function connectGamepad(): void {
   const pad = { connected: true, mapping: "standard", id: "A pad", axes: [0, 0, 0, 0], buttons };
   navigator.getGamepads = () => [pad as unknown as Gamepad];
   (globalThis as TestWindow).testPad = pad;
+  // As browsers do once a button is pressed.
+  dispatchEvent(new Event("gamepadconnected"));
 }
 
 /** Move the left stick vertically, upwards to -1. */
