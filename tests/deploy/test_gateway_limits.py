@@ -68,7 +68,8 @@ class RecordingService:
         with suppress(OSError, asyncio.IncompleteReadError):
             self.heads.append(await reader.readuntil(b"\r\n\r\n"))
             length = len(self._response)
-            writer.write(b"HTTP/1.1 %b\r\nConnection: close\r\nContent-Length: %d\r\n\r\n" % (self._status, length))
+            writer.write(b"HTTP/1.1 %b\r\nConnection: close\r\nRetry-After: 7\r\n" % self._status)
+            writer.write(b"Content-Length: %d\r\n\r\n" % length)
             writer.write(self._response)
             try:
                 await writer.drain()
@@ -145,6 +146,7 @@ async def test_rejection_does_not_wait_for_the_body(
         with run_gateway(tmp_path, service_port, monkeypatch) as port:
             for response in await asyncio.gather(*(send_and_read(port, data) for data in BODIES_THAT_DO_NOT_ARRIVE)):
                 assert response.startswith(b"HTTP/1.1 " + status)
+                assert b"\r\nRetry-After: 7\r\n" in response
                 assert response.endswith(b"\r\n\r\nno")
 
 

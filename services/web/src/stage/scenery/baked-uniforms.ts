@@ -18,13 +18,12 @@ export function createBakedUniforms(): BakedUniforms {
   return { bakedSharp: { value: null }, bakedBlurred: { value: null } };
 }
 
+const CORNER_GLSL = `vec2(${LEFT_M.toFixed(1)}, ${BOTTOM_M.toFixed(1)})`;
+const SIZE_GLSL = `vec2(${WIDTH_M.toFixed(1)}, ${HEIGHT_M.toFixed(1)})`;
+
 /** GLSL: texture coordinates of a position on the plane in metres, and the position of texture coordinates. */
 export const BAKED_GLSL = /* glsl */ `
 uniform sampler2D bakedSharp, bakedBlurred;
-vec2 bakedPlace(vec2 at) {
-  return (at - vec2(${LEFT_M.toFixed(1)}, ${BOTTOM_M.toFixed(1)})) / vec2(${WIDTH_M.toFixed(1)}, ${HEIGHT_M.toFixed(1)});
-}
-vec2 unbakedPlace(vec2 place) {
-  return place * vec2(${WIDTH_M.toFixed(1)}, ${HEIGHT_M.toFixed(1)}) + vec2(${LEFT_M.toFixed(1)}, ${BOTTOM_M.toFixed(1)});
-}
+vec2 bakedPlace(vec2 at) { return (at - ${CORNER_GLSL}) / ${SIZE_GLSL}; }
+vec2 unbakedPlace(vec2 place) { return place * ${SIZE_GLSL} + ${CORNER_GLSL}; }
 `;
