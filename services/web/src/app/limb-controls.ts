@@ -2,10 +2,13 @@
 import type { ClaimState } from "../engine/claim-controller";
 import type { EngineCommand, LimbAction } from "../engine/message";
 import type { PageActions } from "../input/command-dispatcher";
+import type { PageAction } from "../input/mapping";
 import { RemoteCommands } from "../input/remote-commands";
 
 export class LimbControls {
   readonly commands: RemoteCommands;
+  /** True once the engine handles commands. */
+  isReady = false;
   /** Performer whose limbs keys, gamepad and page controls act on. */
   performer = 0;
   #isLimbSelected = false;
@@ -13,9 +16,14 @@ export class LimbControls {
 
   constructor(
     private readonly send: (command: EngineCommand) => void,
-    actions: PageActions,
+    private readonly actions: PageActions,
   ) {
-    this.commands = new RemoteCommands(actions, () => this.#isLimbSelected, send);
+    this.commands = new RemoteCommands({
+      actions,
+      isReady: () => this.isReady,
+      isLimbSelected: () => this.#isLimbSelected,
+      send,
+    });
   }
 
   /** Act on a limb, by default on the one that the action refers to. */
@@ -30,6 +38,11 @@ export class LimbControls {
 
   selectPerformer(performer: number | "next"): void {
     this.send({ type: "performer", performer });
+  }
+
+  /** Run the action of a pressed control that the engine left to the page, as no limb is selected. */
+  run(action: PageAction): void {
+    this.actions[action]();
   }
 
   /** Release all limbs held by keys, gamepad or buttons. Return whether the page knows of any. */

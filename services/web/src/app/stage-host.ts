@@ -153,9 +153,11 @@ export class StageHost {
     switch (event.type) {
       case "ready":
         this.#isReady = true;
+        limbs.isReady = true;
         startup.onStageReady();
         break;
       case "unavailable":
+        limbs.isReady = false;
         this.#showUnavailable(event.reason);
         break;
       case "frame":
@@ -190,6 +192,9 @@ export class StageHost {
       }
       case "limb notice":
         page.strings.notice(event.text);
+        break;
+      case "page action":
+        limbs.run(event.action);
         break;
       case "edit failed":
         page.toast(event.problem ? translate("{title}: {detail}", event.problem) : event.message);

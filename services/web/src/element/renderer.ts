@@ -2,9 +2,9 @@
 import type { ClaimController } from "../engine/claim-controller";
 import type { Playback } from "../engine/playback";
 import type { StageController } from "../engine/stage-controller";
-import type { PageActions } from "../input/command-dispatcher";
+import { createPageActions, type PageActions } from "../input/command-dispatcher";
 import { listenToKeyboard } from "../input/keyboard";
-import { ACTIONS, type Mapping } from "../input/mapping";
+import type { Mapping } from "../input/mapping";
 import { loadMapping } from "../input/mapping-store";
 import { listenToMouse } from "../input/mouse";
 import { listenToPointer, showPointerState } from "../input/pointer-events";
@@ -78,10 +78,9 @@ export class ElementRenderer {
     if (!chunk) return "not loaded";
     const { canvas, frame } = this.view;
     const ignore = () => undefined;
-    const ignoreAll = Object.fromEntries(ACTIONS.map((action) => [action, ignore])) as PageActions;
     const camera = () =>
       this.stageController?.stage.followMotionCamera(!this.stageController.stage.followsMotionCamera);
-    const actions: PageActions = { ...ignoreAll, camera, ...keyActions };
+    const actions: PageActions = { ...createPageActions(ignore), camera, ...keyActions };
     try {
       this.stageController = new chunk.StageController(canvas, this.limbController, {
         getMapping: () => this.mapping,

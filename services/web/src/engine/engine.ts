@@ -5,8 +5,8 @@
 import { AvatarError } from "../avatar/error";
 import { Access } from "../client/access";
 import { ProblemError } from "../client/problem";
-import type { PageActions } from "../input/command-dispatcher";
-import { ACTIONS, DEFAULT_MAPPING } from "../input/mapping";
+import { createPageActions } from "../input/command-dispatcher";
+import { DEFAULT_MAPPING } from "../input/mapping";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import { type Graphics, openGraphics } from "../stage/rendering/graphics";
 import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
@@ -31,9 +31,6 @@ import { publishPlayback } from "./playback-publisher";
 import type { StageController } from "./stage-controller";
 
 const STATISTICS_INTERVAL_MS = 500;
-
-/** The page runs these actions itself when their controls are pressed. */
-const NO_ACTIONS = Object.fromEntries(ACTIONS.map((action) => [action, () => undefined])) as unknown as PageActions;
 
 /** Settings until the page sends its own. */
 const INITIAL_SETTINGS: EngineSettings = {
@@ -109,7 +106,7 @@ export class Engine {
     this.#build(
       new chunk.StageController(this.canvas, this.#claims, {
         getMapping: () => this.#settings.mapping,
-        actions: NO_ACTIONS,
+        actions: createPageActions((action) => this.send({ type: "page action", action })),
         onClaimsChange: () => this.#claims.render(),
         graphics,
       }),
@@ -152,6 +149,9 @@ export class Engine {
         break;
       case "press":
         commands?.press(command.control, command.commands, command.strength, this.#toLocal(command.now));
+        break;
+      case "repeat":
+        commands?.repeat(command.control);
         break;
       case "release":
         commands?.release(command.control, this.#toLocal(command.now));

@@ -5,7 +5,7 @@
 import type { CameraKeyframe, SessionEdit } from "../client/api";
 import type { ViewerStatistics } from "../client/viewer";
 import type { Language } from "../i18n/translator";
-import type { Mapping } from "../input/mapping";
+import type { Mapping, PageAction } from "../input/mapping";
 import type { PointerMessage } from "../input/pointer";
 import type { CommandMessage } from "../input/remote-commands";
 import type { LeaderTime } from "../playout/presentation-clock";
@@ -181,4 +181,6 @@ export type EngineEvent =
   | { type: "limbs"; state: ClaimState }
   | { type: "toast"; message: string; ask: AskOffer | null }
   | { type: "limb notice"; text: string }
+  /** A control was pressed or repeated that moves the selected limb, and there is none: the page runs the action. */
+  | { type: "page action"; action: PageAction }
   | { type: "response"; id: number; result?: unknown; failure?: EngineFailure };

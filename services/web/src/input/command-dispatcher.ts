@@ -2,7 +2,15 @@
 
 import { isLimbInput } from "./digital-input";
 import type { LimbController } from "./limb-controller";
-import { type Action, activeCommands, type Command, type Control, limbOfCommand } from "./mapping";
+import {
+  ACTIONS,
+  activeCommands,
+  type Command,
+  type Control,
+  isPageAction,
+  limbOfCommand,
+  type PageAction,
+} from "./mapping";
 import type { VelocityInputs } from "./velocity-input";
 
 /**
@@ -12,7 +20,14 @@ import type { VelocityInputs } from "./velocity-input";
 const LONG_PRESS_MS = 400;
 
 /** Functions of the page for the actions that claim no limb. */
-export type PageActions = Readonly<Record<Exclude<Action, `take_${string}`>, () => void>>;
+export type PageActions = Readonly<Record<PageAction, () => void>>;
+
+/** Create page actions that all call `run`. */
+export function createPageActions(run: (action: PageAction) => void): PageActions {
+  return Object.fromEntries(
+    ACTIONS.filter(isPageAction).map((action) => [action, () => run(action)]),
+  ) as unknown as PageActions;
+}
 
 /** Commands of the controls of all devices. */
 export interface CommandInput {
@@ -22,8 +37,11 @@ export interface CommandInput {
    * `bound` applies now.
    */
   press(control: Control, bound: readonly Command[], strength: number, now: number): boolean;
-  /** Handle automatic repetition: seeking repeats, other commands do not. */
-  repeat(control: Control): void;
+  /**
+   * Handle automatic repetition: seeking repeats, other commands do not. Return whether any command of the control
+   * applies now.
+   */
+  repeat(control: Control): boolean;
   release(control: Control, now: number): void;
   /** Release all controls that match, without the effect of a tap. */
   releaseAll(matches?: (control: Control) => boolean): void;
@@ -67,14 +85,14 @@ export class CommandDispatcher implements CommandInput {
         this.limbController.source(limb) !== "pointer" && !this.velocity.holds(limb) && this.velocity.hold(limb),
     );
     this.#pressed.set(control, { commands, pressedAt: now, limbs, claimedLimbs: claimed });
-    for (const command of commands)
-      if (!isLimbInput(command) && limbOfCommand(command) === null) this.actions[command as keyof PageActions]();
+    for (const action of commands.filter(isPageAction)) this.actions[action]();
     return true;
   }
 
-  repeat(control: Control): void {
+  repeat(control: Control): boolean {
     for (const command of this.#pressed.get(control)?.commands ?? [])
       if (command === "back" || command === "forward") this.actions[command]();
+    return this.isDown(control);
   }
 
   release(control: Control, now: number): void {

@@ -33,10 +33,7 @@ export function listenToKeyboard(
   });
   const press = (event: KeyboardEvent): boolean => {
     const { code } = event;
-    if (commands.isDown(code)) {
-      if (event.repeat) commands.repeat(code);
-      return true;
-    }
+    if (commands.isDown(code)) return event.repeat ? commands.repeat(code) : true;
     if (event.repeat) return false;
     if (code === "Escape") {
       if (!limbs.releaseAll()) actions.onEscape();

@@ -30,6 +30,8 @@ export const ACTIONS = [
   "line",
 ] as const;
 export type Action = (typeof ACTIONS)[number];
+/** Action that claims no limb. */
+export type PageAction = Exclude<Action, `take_${string}`>;
 export type Command = DigitalInput | SelectedLimbInput | Action;
 
 export interface Mapping {
@@ -122,6 +124,10 @@ export function limbOfCommand(command: Command): number | null {
 
 export function isSelectedLimbInput(command: Command): command is SelectedLimbInput {
   return command.startsWith("held_");
+}
+
+export function isPageAction(command: Command): command is PageAction {
+  return (ACTIONS as readonly string[]).includes(command) && limbOfCommand(command) === null;
 }
 
 export function isPadControl(control: Control): boolean {

@@ -29,9 +29,9 @@ export function listenToMouse(
   const press = (event: MouseEvent): Control | null => {
     const control = controlOfEvent(event);
     const bound = control === null ? undefined : mapping().bindings[control];
-    if (control === null || !bound || !commands.press(control, bound, 1, event.timeStamp)) return null;
-    event.preventDefault();
-    return control;
+    if (control === null || !bound) return null;
+    if (commands.press(control, bound, 1, event.timeStamp)) event.preventDefault();
+    return commands.isDown(control) ? control : null;
   };
   const releaseWheel = (now: number) => {
     clearTimeout(wheelTimer);

@@ -31,6 +31,25 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     return page;
   }
 
+  test("keys pressed before the page knows of their claim move the limb", async () => {
+    const page = await open("Aiko");
+    await pauseAtStart(page);
+    const before = await jointPosition(page, "l_wrist");
+    await page.evaluate(() => {
+      const press = (type: string, code: string) =>
+        document.body.dispatchEvent(new KeyboardEvent(type, { code, bubbles: true }));
+      press("keydown", "Digit2");
+      press("keyup", "Digit2");
+      press("keydown", "ArrowUp");
+    });
+    await waitInEngine(
+      page,
+      (height) =>
+        (globalThis.bunraku.stage.scene.getObjectByName("l_wrist")?.matrixWorld.elements[13] ?? 0) > height + 0.05,
+      before[1],
+    );
+  });
+
   test("a changed key binding is stored; a broken one falls back to defaults", async () => {
     const page = await open("Aiko");
     await page.keyboard.press("KeyU");
