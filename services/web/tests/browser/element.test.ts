@@ -105,6 +105,8 @@ describeInBrowser("embedded stage", { server: "guarded" }, (fixture) => {
     await page.getByRole("button", { name: "Take the left hand" }).waitFor();
     await page.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
     await expect.poll(() => openSockets().sort()).toEqual(["control", "stream"]);
+    // Its event "ready" comes before the next frame.
+    await waitForStages(page);
 
     // A motion without a session plays on a private timeline.
     await page.evaluate(() => {
