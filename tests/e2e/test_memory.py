@@ -14,7 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from websockets.exceptions import ConnectionClosed
+from websockets import Origin
+from websockets.asyncio.client import connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.server import ServerProtocol
 
 from bunraku.client import Client, Puppeteer
 from bunraku.session.puppeteer_connection import PuppeteerConnection
@@ -30,6 +33,7 @@ from tests.time_limit import HANG_TIMEOUT_S
 OWNED_BY_CLIENTS = (
     HandoffProtocol,
     PuppeteerConnection,
+    ServerProtocol,
     Stage,
     StageEndpoint,
     ViewerConnection,
@@ -82,6 +86,10 @@ async def test_clients_that_left_leave_no_object_behind(tmp_path: Path, clip_fil
                 await message(refused)
                 with pytest.raises(ConnectionClosed):
                     await refused.recv()
+            with pytest.raises(InvalidStatus):
+                await connect(
+                    f"{url.replace('http', 'ws')}/v1/motions/{motion}/stream", origin=Origin("https://other.example")
+                )
             assert living[Stage] == living[StageEndpoint] == 1
             await client._request("DELETE", f"/v1/sessions/{session}")
             await wait_until_freed(living)

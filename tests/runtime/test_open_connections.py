@@ -1,5 +1,8 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -29,16 +32,32 @@ def test_address_with_the_most_connections_makes_room() -> None:
     assert len(connections) == 10
 
 
-def test_removed_connection_makes_room_once() -> None:
+@pytest.mark.parametrize("remove", [OpenConnections.discard, OpenConnections.remove])
+def test_removed_connection_makes_room_once(remove: Callable[[OpenConnections, Connection], None]) -> None:
     connections = OpenConnections(2)
     first, second = Connection("a"), Connection("a")
     connections.add(first)
     connections.add(second)
-    connections.discard(first)
-    connections.discard(first)
+    remove(connections, first)
+    remove(connections, first)
     connections.add(Connection("a"))
     assert not second.is_aborted
     assert len(connections) == 2
+
+
+@pytest.mark.parametrize("remove", [OpenConnections.discard, OpenConnections.remove])
+def test_removed_connections_do_not_count_for_their_address(
+    remove: Callable[[OpenConnections, Connection], None],
+) -> None:
+    connections = OpenConnections(2)
+    for _ in range(3):
+        ended = Connection("a")
+        connections.add(ended)
+        remove(connections, ended)
+    present = [Connection("b") for _ in range(3)]
+    for connection in present:
+        connections.add(connection)
+    assert [connection.is_aborted for connection in present] == [False, False, True]
 
 
 @given(st.lists(st.tuples(st.sampled_from("abc"), st.booleans()), max_size=60))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import multiprocessing
 import os
 import signal
@@ -200,3 +201,13 @@ def test_environment_of_the_server_itself_is_unchanged(monkeypatch: pytest.Monke
         assert os.environ["BUNRAKU_SECRET"] == SECRET
         assert SECRET not in subprocess.run(["env"], capture_output=True, text=True, check=True).stdout
     assert SECRET in subprocess.run(["env"], capture_output=True, text=True, check=True).stdout
+
+
+def test_later_workers_do_not_load_the_c_library_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    sandbox.start_worker_server()
+
+    def fail(*_: object, **__: object) -> None:
+        pytest.fail("the C library was loaded again")
+
+    monkeypatch.setattr(ctypes, "CDLL", fail)
+    sandbox.start_worker_server()

@@ -75,7 +75,7 @@ class Replica(ABC):
         self.context = ServiceContext(
             _SETTINGS,
             Catalogue(cluster.catalogue_url),
-            MotionStore(cluster.disk.objects_of(self.node)),
+            MotionStore(cluster.disk.objects_of(self.node), self.node.clock),
             self.bus,
             BrokerKeyValueStore(self.bus, cluster.broker),
             # used by the HTTP applications only

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,8 @@ from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.storage import motion_store
-from bunraku.storage.motion_store import MotionStore
+from bunraku.storage.motion_store import MAX_CACHE_IDLE_US, MotionStore
+from bunraku.storage.object_storage import ObjectStorage
 from bunraku.wire.messages import Data, Description, unpack
 from tests.vectors.blocks import random_motion
 
@@ -70,7 +72,37 @@ async def test_cache_is_bounded_and_evicted_motions_are_reloaded(monkeypatch: py
     cached = store._cache
     assert list(cached) == ["m3", "m4"] or list(cached) == ["m2", "m3", "m4"]
     assert await store.get("m0") is not None
-    assert store._cached_bytes == sum(stored.total_bytes for stored in cached.values())
+    assert store._cached_bytes == sum(stored.total_bytes for stored, _ in cached.values())
+
+
+async def test_motion_without_requests_leaves_the_cache() -> None:
+    now_us = 0
+    store = MotionStore(ObjectStorage("memory:///"), lambda: now_us)
+    for name in ("idle", "requested", "new"):
+        await store.put(name, pack_motion(name, ENCODED))
+    await store.get("idle")
+    await store.get("requested")
+    now_us = 1
+    await store.get("requested")
+    now_us = MAX_CACHE_IDLE_US
+    await store.get("new")
+    assert list(store._cache) == ["idle", "requested", "new"]
+    now_us = MAX_CACHE_IDLE_US + 1
+    await store.get("new")
+    assert list(store._cache) == ["requested", "new"]
+    assert store._cached_bytes == sum(stored.total_bytes for stored, _ in store._cache.values())
+
+
+async def test_motion_in_use_is_loaded_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(motion_store, "MAX_CACHE_BYTES", 1)
+    store = MotionStore.open("memory:///")
+    for name in ("m1", "m2"):
+        await store.put(name, pack_motion(name, ENCODED))
+    first, second = await asyncio.gather(store.get("m1"), store.get("m1"))
+    assert first is second is not None
+    await store.get("m2")
+    assert list(store._cache) == ["m2"]
+    assert await store.get("m1") is first
 
 
 async def test_motion_of_another_codec_is_none_until_replaced(tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ class PerformerTracks:
     placement: Placement
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class StoredMotion:
     """A motion as it is sent.
 

@@ -45,3 +45,7 @@ class OpenConnections(set[Any]):
         source.pop(connection, None)
         if not source:
             self._by_source.pop(connection.source, None)
+
+    def remove(self, connection: OpenConnection) -> None:
+        """Remove a connection: uvicorn calls this for each that ends, even if it has made room before."""
+        self.discard(connection)

@@ -22,6 +22,7 @@ import sys
 import threading
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from functools import cache
 from multiprocessing import forkserver
 from pathlib import Path
 
@@ -77,7 +78,7 @@ def enter_sandbox(result_descriptor: int, readable: Collection[Path], max_memory
     _limit_resources(max_memory_bytes, timeout_s)
     if sys.platform != "linux":
         return
-    libc = ctypes.CDLL(None, use_errno=True)
+    libc = _libc()
     parent = os.getppid()
     libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL, 0, 0, 0)
     if os.getppid() != parent:
@@ -92,7 +93,13 @@ def enter_sandbox(result_descriptor: int, readable: Collection[Path], max_memory
 def _deny_new_privileges() -> None:
     """Let programs that this thread or its children start gain no privileges (prctl(2), PR_SET_NO_NEW_PRIVS)."""
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+        _libc().prctl(_PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0)
+
+
+@cache
+def _libc() -> ctypes.CDLL:
+    """Return the C library; each object of it is a reference cycle that waits for a garbage collection."""
+    return ctypes.CDLL(None, use_errno=True)
 
 
 def _prepare_server() -> None:

@@ -88,6 +88,7 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         self._cancel_timeout()
         self._withdraw_extension()
         super().connection_lost(exc)
+        self._end_parser()
 
     def handle_connect(self, event: Request) -> None:
         # the application's task starts after this call, so it sees the extensions
@@ -107,6 +108,7 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
             return None
         self._cancel_timeout()
         self._withdraw_extension()
+        self._end_parser()
         self.stop_keepalive()
         self.connections.discard(self)
         self.transport = _DETACHED_TRANSPORT
@@ -124,6 +126,10 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
         extensions = getattr(self, "scope", {}).get("extensions")
         if extensions is not None:
             extensions.pop(HANDOFF_EXTENSION, None)
+
+    def _end_parser(self) -> None:
+        """End the parser of the handshake, which refers to its own protocol, so that both are freed at once."""
+        self.conn.parser.close()
 
     def _cancel_timeout(self) -> None:
         if self._handshake_timer is not None:
