@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 import pytest
 import uvicorn
 from starlette.applications import Starlette
+from starlette.responses import PlainTextResponse
 from starlette.routing import WebSocketRoute
 from starlette.websockets import WebSocket
 from websockets.asyncio.client import ClientConnection, connect
@@ -173,6 +174,21 @@ async def test_rejected_client_gets_the_reason_however_much_it_sends() -> None:
         assert received.count(b"\x8a\x00") == 0
         writer.close()
         await ended.wait()
+
+
+async def test_handshake_rejected_by_an_http_response_is_no_error_of_the_server(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def endpoint(ws: WebSocket) -> None:
+        await ws.send_denial_response(PlainTextResponse("too often", 429))
+
+    async with serve_app(endpoint) as (url, _):
+        parts = urlsplit(url)
+        reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
+        writer.write(upgrade_request(url))
+        assert (await reader.read()).startswith(b"HTTP/1.1 429 ")
+        writer.close()
+    assert [record.getMessage() for record in caplog.records] == []
 
 
 MALFORMED_LINES = {

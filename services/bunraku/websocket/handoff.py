@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
+from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
@@ -98,6 +99,12 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
             assert extensions is not None
             extensions[HANDOFF_EXTENSION] = {"take": self.detach}
             extensions[link.LINK_EXTENSION] = {"transport": self.transport}
+
+    async def send(self, message: ASGISendEvent) -> None:
+        await super().send(message)
+        if self.close_sent:
+            # an HTTP response completes the handshake, too: otherwise each rejected client is logged as an error
+            self.handshake_complete = True
 
     def detach(
         self, listener: ConnectionListener, clock: Callable[[], int], limit: FrameLimit
