@@ -121,7 +121,7 @@ class _StatusLine:
             self._status.stop()
 
     def update(self) -> None:
-        """Update the line if the last update is `STATUS_INTERVAL_S` ago."""
+        """Update the text if the last update is `STATUS_INTERVAL_S` ago."""
         now = time.monotonic()
         if self._status is None or now - self._updated_at < STATUS_INTERVAL_S:
             return

@@ -22,7 +22,7 @@ PackLevels = Callable[[int, bytes, bool], bytes]
 
 
 class PerformerMissing(Exception):
-    """Performer that is not on the stage; the message says how many there are."""
+    """Performer that is not on the stage; the message has their number."""
 
 
 class StageOutput(Protocol):
@@ -83,7 +83,7 @@ class VmcOutput:
         """Do nothing: receivers keep the last pose."""
 
     def _check_performer(self) -> None:
-        # tracks may be described after the first frames; the limbs tell the number of performers at once
+        # tracks may be described after the first frames, but the number of limbs is known at once
         presence = self._viewer.presence
         if self.frames == 0 and presence is not None and self._performer >= len(presence.limbs) // len(LIMBS):
             count = len(presence.limbs) // len(LIMBS)
