@@ -22,6 +22,7 @@ DOCUMENTS = [
     *(ROOT / "proto").glob("*.md"),
 ]
 MAX_README_WORDS = 1200
+COMMAND_GROUPS = ("bench", "send")
 BUNRAKU = Path(sys.executable).parent / "bunraku"
 
 
@@ -87,7 +88,7 @@ def documented_commands() -> list[tuple[str, ...]]:
         for block in re.findall(r"```sh\n(.*?)```", document.read_text(encoding="utf-8"), re.DOTALL):
             for line in re.findall(r"^(?:\w+=\S+ )*bunraku ([^#\n]+)", block, re.MULTILINE):
                 words = line.split()
-                names = words[:2] if words[0] == "bench" else words[:1]
+                names = words[:2] if words[0] in COMMAND_GROUPS else words[:1]
                 options = sorted(word.partition("=")[0] for word in words if word.startswith("--"))
                 found.add((" ".join(names), *options))
     return sorted(found)

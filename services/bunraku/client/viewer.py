@@ -140,6 +140,11 @@ class Viewer:
         return parts._replace(query=urlencode([*kept, *query.items()])).geturl()
 
     @property
+    def reconnects(self) -> int:
+        """Number of connections lost, or replaced because of silence."""
+        return self._connection.reconnects
+
+    @property
     def track(self) -> MotionTrack | None:
         """Track of the first performer, None before its Description."""
         return self._blocks.track if self._blocks is not None else None
@@ -328,7 +333,7 @@ class Viewer:
     def _finish_statistics(self) -> ViewerStatistics:
         statistics = self.statistics
         statistics.seconds = time.monotonic() - self._started_at
-        statistics.reconnects = self._connection.reconnects
+        statistics.reconnects = self.reconnects
         statistics.kbps = statistics.bytes * 8e-3 / statistics.seconds
         statistics.clock_offset_ms = self.clock.offset / 1e3 - (time.time_ns() // 1000 - self._local_clock()) / 1e3
         statistics.clock_error_ms = self.clock.error_bound / 1e3 if self.clock.is_synchronised else None
