@@ -1,7 +1,7 @@
 /** Composition of the page: session, stage, inputs, sound and user interface. */
 import { browserSoundPreference } from "../audio/preference";
 import { pageAccess } from "../client/access";
-import type { EngineCommand } from "../engine/message";
+import type { EngineCommand, StageView } from "../engine/message";
 import { pageLanguage, translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { loadMapping, saveMapping } from "../input/mapping-store";
@@ -35,7 +35,8 @@ export class App implements AppParts {
   readonly theme: ThemeChoice;
   #mapping: Mapping = loadMapping();
 
-  constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence) {
+  /** `view` is the view without controls; null for the page with its controls. */
+  constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence, view: StageView | null) {
     const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
     canvas.ariaLabel = translate(
       "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.",
@@ -51,6 +52,7 @@ export class App implements AppParts {
         language: pageLanguage(),
         timeOrigin: performance.timeOrigin,
         bestQuality: query.get("quality") === "best",
+        view,
       },
       (event) => this.stageHost.onEvent(event),
     );
@@ -74,6 +76,7 @@ export class App implements AppParts {
       getPlayback: () => this.playback,
       invitation: new Invitation(page.nameTags),
       viewOnly: !pageAccess.allows("control"),
+      isAlone: view !== null,
       getMapping: () => this.#mapping,
     });
     this.avatarSlots = new AvatarSlots(

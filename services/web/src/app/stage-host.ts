@@ -43,6 +43,8 @@ export interface StageHostOptions {
   invitation: Invitation;
   /** True if this page may not claim limbs. */
   viewOnly: boolean;
+  /** True if the stage is shown without the page around it, and without inputs. */
+  isAlone: boolean;
   getPlayback(): Pick<PlaybackController, "current" | "onChange" | "onTime" | "onUnauthorized">;
   getMapping(): Mapping;
 }
@@ -73,7 +75,12 @@ export class StageHost {
     this.#showLimbs(NO_CLAIMS);
     this.resize();
     addEventListener("resize", () => this.resize());
-    this.#listenToInputs();
+    if (!this.options.isAlone) this.#listenToInputs();
+    // A page in the background draws no frames, so nothing would release the inputs that were pressed.
+    document.addEventListener("visibilitychange", () => {
+      this.#setSettings({ isHidden: document.hidden });
+      if (document.hidden) this.options.limbs.commands.releaseAll();
+    });
     await engine.start(await worker);
   }
 
@@ -127,13 +134,15 @@ export class StageHost {
   /** Fit the picture to the window, beside the panels that are open. */
   resize(): void {
     const { panels } = this.options.page;
-    const framing = LANDSCAPE_PHONE.matches
-      ? "sideways"
-      : !PHONE.matches
-        ? "desktop"
-        : panels.isSheetOpen
-          ? "sheet"
-          : "phone";
+    const framing = this.options.isAlone
+      ? "alone"
+      : LANDSCAPE_PHONE.matches
+        ? "sideways"
+        : !PHONE.matches
+          ? "desktop"
+          : panels.isSheetOpen
+            ? "sheet"
+            : "phone";
     this.#setSettings({
       viewport: {
         width: innerWidth,
@@ -141,7 +150,7 @@ export class StageHost {
         framing,
         pixelRatio: devicePixelRatio,
         sideInsets: framing === "desktop" || framing === "sideways" ? panels.sideInsets : [0, 0],
-        bottomInset: panels.bottomInset,
+        bottomInset: framing === "alone" ? 0 : panels.bottomInset,
       },
     });
   }
@@ -164,7 +173,10 @@ export class StageHost {
         playback.onTime(event.playback, event.time);
         this.#overlay.update(event.changes);
         if (event.changes?.hasPose && !viewOnly) invitation.start();
-        if (event.changes?.hasDrawnPerformer) startup.finish();
+        if (event.changes?.hasDrawnPerformer) {
+          document.documentElement.dataset["drawn"] = "";
+          startup.finish();
+        }
         break;
       case "playback":
         playback.onChange(event.playback, event.change);
@@ -235,11 +247,6 @@ export class StageHost {
     startup.runWhenFinished(() => {
       addEventListener("gamepadconnected", () => this.#gamepad.start());
       this.#gamepad.start();
-    });
-    // A page in the background draws no frames, so nothing would release the inputs that were pressed.
-    document.addEventListener("visibilitychange", () => {
-      this.#setSettings({ isHidden: document.hidden });
-      if (document.hidden) commands.releaseAll();
     });
   }
 

@@ -49,6 +49,11 @@ export class Access {
     this.#claims = token === null ? FULL_ACCESS : parseClaims(token);
   }
 
+  /** Use no permission beyond viewing, whatever the token allows. */
+  limitToViewing(): void {
+    this.#claims = { ...this.#claims, role: "view" };
+  }
+
   /** True if there is a token, which means that the server requires one. */
   get hasToken(): boolean {
     return this.#token !== null;

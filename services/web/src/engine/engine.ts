@@ -72,6 +72,7 @@ export class Engine {
   ) {
     this.#clockShiftMs = options.timeOrigin - performance.timeOrigin;
     this.#access = new Access(options.server, options.token);
+    if (options.view) this.#access.limitToViewing();
     this.#access.onUnauthorized(({ title, detail, hint }) => send({ type: "unauthorized", title, detail, hint }));
     this.#claims = new ClaimController(
       {
@@ -109,6 +110,9 @@ export class Engine {
         actions: createPageActions((action) => this.send({ type: "page action", action })),
         onClaimsChange: () => this.#claims.render(),
         graphics,
+        isTransparent: this.options.view?.isTransparent ?? false,
+        showsHandles: this.options.view === null,
+        camera: this.options.view?.camera ?? null,
       }),
     );
     this.send({ type: "ready" });

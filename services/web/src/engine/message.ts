@@ -17,6 +17,25 @@ import type { Presence, TimelineState } from "../wire/messages";
 import type { AskOffer, ClaimState } from "./claim-controller";
 import type { PlaybackKind } from "./playback";
 
+/** Camera that is fixed, as the seven numbers of a motion's camera (`proto/codec.md`, 2.14). */
+export type FixedCamera = readonly [
+  x: number,
+  y: number,
+  z: number,
+  gazeX: number,
+  gazeY: number,
+  gazeZ: number,
+  fov: number,
+];
+
+/** View of the page without controls. */
+export interface StageView {
+  /** True if the backdrop and the floor are left out, so that what is behind the page is seen. */
+  readonly isTransparent: boolean;
+  /** Null for the motion's camera, or the audience's view if the motion has none. */
+  readonly camera: FixedCamera | null;
+}
+
 /** Values that an engine is started with. */
 export interface EngineOptions {
   /** Origin of the server, and the token for it, if any. */
@@ -27,6 +46,8 @@ export interface EngineOptions {
   readonly timeOrigin: number;
   /** Draw in the best quality, whatever it costs. */
   readonly bestQuality: boolean;
+  /** View without controls; null for the page with its controls. */
+  readonly view: StageView | null;
 }
 
 /** State of the page that the engine follows. */

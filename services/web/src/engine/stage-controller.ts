@@ -25,6 +25,12 @@ export interface StageControllerOptions {
   onClaimsChange: () => void;
   /** Graphics of the canvas, if they were opened already. */
   graphics?: Graphics;
+  /** Leave out the backdrop and the floor, so that what is behind the canvas is seen. */
+  isTransparent?: boolean;
+  /** Show the rings by which limbs are taken; true by default. */
+  showsHandles?: boolean;
+  /** Camera in place of the motion's, as its seven numbers. */
+  camera?: ArrayLike<number> | null;
 }
 
 /** Time for which the rings of a newly selected performer are highlighted. */
@@ -43,6 +49,7 @@ export class StageController {
   readonly pointer: PointerInput;
   readonly velocity: VelocityInputs;
   readonly commands: CommandDispatcher;
+  readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
   #lastDrawMs = 0;
   /** Last selected performer, and the time in milliseconds until which its rings are highlighted. */
@@ -52,9 +59,20 @@ export class StageController {
   constructor(
     canvas: StageCanvas,
     private readonly limbController: ClaimController,
-    { getMapping, actions, onClaimsChange, graphics }: StageControllerOptions,
+    options: StageControllerOptions,
   ) {
-    this.stage = new Stage(canvas, graphics);
+    const {
+      getMapping,
+      actions,
+      onClaimsChange,
+      graphics,
+      isTransparent,
+      showsHandles = true,
+      camera = null,
+    } = options;
+    this.stage = new Stage(canvas, graphics, isTransparent);
+    this.stage.strings.showsHandles = showsHandles;
+    this.#camera = camera;
     this.hands = new LimbController(this.stage);
     this.hands.onChange = onClaimsChange;
     const isFree = (limb: number) => limbController.isFree(limb);
@@ -133,7 +151,8 @@ export class StageController {
     });
     // The camera must not move under a finger that drags a limb.
     if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : selection.performer;
-    stage.draw(poses, states, seconds, viewer?.cameraAt(now), viewer?.lightsAt(now), viewer?.presentationTime(now));
+    const camera = this.#camera ?? viewer?.cameraAt(now);
+    stage.draw(poses, states, seconds, camera, viewer?.lightsAt(now), viewer?.presentationTime(now));
     return { pose: poses[0] ?? null, limbs };
   }
 

@@ -70,13 +70,21 @@ export class Stage {
   /** Progress of the first frame with a performer. */
   #firstFrame: "pending" | "submitted" | "complete" = "pending";
 
-  /** Create a stage that draws on `canvas`. Throw if the browser has no WebGL 2. */
-  constructor(canvas: StageCanvas, graphics: Graphics = openGraphics(canvas)) {
+  /**
+   * Create a stage that draws on `canvas`; a transparent one has no scenery, and its picture has an alpha channel by
+   * which the colours are multiplied. Throw if the browser has no WebGL 2.
+   */
+  constructor(
+    canvas: StageCanvas,
+    graphics: Graphics = openGraphics(canvas),
+    private readonly isTransparent = false,
+  ) {
     this.#frameRenderer = new FrameRenderer(canvas, graphics);
     this.renderer = this.#frameRenderer.renderer;
     this.#performerGroup = new PerformerGroup(this.#floorHeight);
     this.rig.group.add(this.audience.camera, this.#lights.group);
     this.scene.add(this.rig.group, this.#performerGroup.group);
+    this.strings.isOverNothing = this.isTransparent;
     // They are updated before each frame, to see whether anything has moved.
     this.scene.matrixWorldAutoUpdate = false;
     // Software rendering shows the performers first: the scenery takes longer to draw than they do.
@@ -144,7 +152,7 @@ export class Stage {
     this.#lights.applyLook(this.#look);
     this.#updateEnvironment();
     this.renderer.toneMappingExposure = this.#look.exposure;
-    this.renderer.setClearColor(this.#look.backdrop.middle);
+    this.renderer.setClearColor(this.#look.backdrop.middle, this.isTransparent ? 0 : 1);
     this.#applyQuality();
     this.#frameRenderer.invalidate();
   }
@@ -328,8 +336,8 @@ export class Stage {
   }
 
   #addScenery(): void {
-    if (this.#scenery.group.parent) return;
-    this.rig.group.add(this.#scenery.group);
+    if (this.strings.group.parent) return;
+    if (!this.isTransparent) this.rig.group.add(this.#scenery.group);
     this.scene.add(this.strings.group);
     if (this.puppet) this.#compileShaders();
   }

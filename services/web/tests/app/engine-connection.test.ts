@@ -3,7 +3,7 @@ import { EngineConnection, EngineError } from "../../src/app/engine-connection";
 import { startEngineWorker } from "../../src/app/engine-worker";
 import type { EngineCommand, EngineEvent } from "../../src/engine/message";
 
-const OPTIONS = { server: "", token: null, language: "en", timeOrigin: 0, bestQuality: false } as const;
+const OPTIONS = { server: "", token: null, language: "en", timeOrigin: 0, bestQuality: false, view: null } as const;
 
 /** Worker that answers as the test says. */
 class FakeWorker {

@@ -218,3 +218,14 @@ test("each Access uses its own server and token", async () => {
   expect(denied).toEqual(["Link revoked"]);
   expect(second.authorizeSocketUrl("wss://other.example/stream")).toBe("wss://other.example/stream");
 });
+
+test("access that is limited to viewing keeps its token and its session", () => {
+  const access = new Access("", makeToken({ role: "ingest", session: "s1" }));
+  access.limitToViewing();
+  expect([access.role, access.allows("control"), access.isRestricted, access.hasToken]).toEqual([
+    "view",
+    false,
+    true,
+    true,
+  ]);
+});

@@ -12,6 +12,7 @@ const OPTIONS: EngineOptions = {
   language: "en",
   timeOrigin: performance.timeOrigin,
   bestQuality: false,
+  view: null,
 };
 const PEOPLE = [
   { id: "a", name: "Aiko", colour: 0 },

@@ -10,16 +10,17 @@ import type { ScreenBox } from "../camera/screen-box";
 
 const FRAGMENT_GLSL = /* glsl */ `
 uniform sampler2D picture; uniform vec2 texel;
-float luma(vec3 colour) { return dot(colour, vec3(.299, .587, .114)); }
+// Where the picture is transparent, edges are those of its alpha, too.
+float luma(vec4 colour) { return dot(colour.rgb, vec3(.299, .587, .114)) + .5 * (1. - colour.a); }
 void main() {
   vec2 at = gl_FragCoord.xy * texel;
   // Single texels: interpolated ones take several times as long without a graphics processor.
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float leftUp = luma(texelFetch(picture, pixel + ivec2(-1, 1), 0).rgb);
-  float rightUp = luma(texelFetch(picture, pixel + 1, 0).rgb);
-  float leftDown = luma(texelFetch(picture, pixel - 1, 0).rgb);
-  float rightDown = luma(texelFetch(picture, pixel + ivec2(1, -1), 0).rgb);
-  float centre = luma(texelFetch(picture, pixel, 0).rgb);
+  float leftUp = luma(texelFetch(picture, pixel + ivec2(-1, 1), 0));
+  float rightUp = luma(texelFetch(picture, pixel + 1, 0));
+  float leftDown = luma(texelFetch(picture, pixel - 1, 0));
+  float rightDown = luma(texelFetch(picture, pixel + ivec2(1, -1), 0));
+  float centre = luma(texelFetch(picture, pixel, 0));
   float low = min(centre, min(min(leftUp, rightUp), min(leftDown, rightDown)));
   float high = max(centre, max(max(leftUp, rightUp), max(leftDown, rightDown)));
   if (high - low < max(.04, .125 * high)) discard;
@@ -27,10 +28,10 @@ void main() {
   vec2 along = vec2(leftDown + rightDown - leftUp - rightUp, leftUp + leftDown - rightUp - rightDown);
   float flatness = max((leftUp + rightUp + leftDown + rightDown) * .03, .008);
   along = clamp(along / (min(abs(along.x), abs(along.y)) + flatness), -8., 8.) * texel;
-  vec3 near = .5 * (texture2D(picture, at - along / 6.).rgb + texture2D(picture, at + along / 6.).rgb);
-  vec3 far = .5 * near + .25 * (texture2D(picture, at - .5 * along).rgb + texture2D(picture, at + .5 * along).rgb);
+  vec4 near = .5 * (texture2D(picture, at - along / 6.) + texture2D(picture, at + along / 6.));
+  vec4 far = .5 * near + .25 * (texture2D(picture, at - .5 * along) + texture2D(picture, at + .5 * along));
   float reached = luma(far);
-  gl_FragColor = vec4(reached < low || reached > high ? near : far, 1.);
+  gl_FragColor = reached < low || reached > high ? near : far;
 }`;
 
 /** Distance to the pixels that a smoothed one is mixed of, in pixels. */

@@ -99,6 +99,16 @@ export class Strings {
     }));
   }
 
+  /** Draws for a transparent picture, whose colours are multiplied by its alpha. */
+  set isOverNothing(on: boolean) {
+    this.#threads.isOverNothing = on;
+  }
+
+  /** Shows the rings by which limbs are taken. */
+  set showsHandles(on: boolean) {
+    this.#rings.mesh.visible = on;
+  }
+
   /** Shake the ring of a limb that another puppeteer holds. */
   shakeRing(limb: number): void {
     if (!this.reducedMotion) this.#animations[limb].shake = 1;

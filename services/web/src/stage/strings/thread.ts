@@ -44,7 +44,7 @@ export class Threads {
     for (const [name, values] of Object.entries(this.#attributes)) geometry.setAttribute(name, values);
     geometry.instanceCount = 0;
     const material = new ShaderMaterial({
-      uniforms: { dark: { value: 1 } },
+      uniforms: { dark: { value: 1 }, overNothing: { value: 0 } },
       transparent: true,
       depthWrite: false,
       side: DoubleSide,
@@ -68,7 +68,7 @@ export class Threads {
           gl_Position = projectionMatrix * at;
         }`,
       fragmentShader: /* glsl */ `
-        uniform float dark;
+        uniform float dark, overNothing;
         varying float vSide, vHalf, vPull; varying vec4 vTint;
         void main() {
           float away = abs(vSide) * vHalf, pixel = fwidth(vSide) * vHalf;
@@ -82,7 +82,9 @@ export class Threads {
           vec3 shown = gl_FragColor.rgb * core;
           gl_FragColor = vec4(vTint.rgb, 1.);
           #include <colorspace_fragment>
-          gl_FragColor = vec4(shown + gl_FragColor.rgb * glow, core);
+          shown += gl_FragColor.rgb * glow;
+          // The glow is added to what is behind. Where there is nothing, no colour may be stronger than its alpha.
+          gl_FragColor = vec4(shown, max(core, overNothing * max(shown.r, max(shown.g, shown.b))));
         }`,
     });
     this.mesh = new Mesh(geometry, material);
@@ -93,6 +95,11 @@ export class Threads {
 
   set dark(on: boolean) {
     this.mesh.material.uniforms.dark.value = on ? 1 : 0;
+  }
+
+  /** Draws for a transparent picture, whose colours are multiplied by its alpha. */
+  set isOverNothing(on: boolean) {
+    this.mesh.material.uniforms.overNothing.value = on ? 1 : 0;
   }
 
   set count(count: number) {

@@ -190,13 +190,19 @@ test("ten minutes of constant movement take less than five megabytes", () => {
     return heapUsed + external;
   };
   const view = createView();
-  const recorder = new CameraRecorder();
-  const before = heapBytes();
-  // Alternating sides: each frame is a keyframe.
-  for (let frame = 0; frame < MAX_KEYFRAMES + 1000; frame++) {
-    viewFromNumbers([frame % 2, 1, 4, 0, 1, 0, 0.45], view);
-    recorder.add(BEGAN + frame * FRAME, view);
-  }
-  expect(heapBytes() - before).toBeLessThan(5e6);
-  expect(recorder.keyframes().length).toBeGreaterThan(MAX_KEYFRAMES - 10);
+  // The median of several: what other files of this thread have left is freed at any time.
+  const growths = Array.from({ length: 5 }, () => {
+    const before = heapBytes();
+    const recorder = new CameraRecorder();
+    // Alternating sides: each frame is a keyframe.
+    for (let frame = 0; frame < MAX_KEYFRAMES + 1000; frame++) {
+      viewFromNumbers([frame % 2, 1, 4, 0, 1, 0, 0.45], view);
+      recorder.add(BEGAN + frame * FRAME, view);
+    }
+    const growth = heapBytes() - before;
+    expect(recorder.keyframes().length).toBeGreaterThan(MAX_KEYFRAMES - 10);
+    return growth;
+  }).sort((a, b) => a - b);
+  expect(growths[2]).toBeLessThan(5e6);
+  expect(growths[2]).toBeGreaterThan(1e5);
 });
