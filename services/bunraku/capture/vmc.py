@@ -1,0 +1,104 @@
+"""Frames of the Virtual Motion Capture protocol, performer to marionette (protocol.vmc.info, 2.7).
+
+Bones are local transforms of Unity's `HumanBodyBones`, relative to the T-pose of an avatar whose bones have no rotation
+there; the root moves the avatar.
+
+A frame is assembled across datagrams. It ends with /VMC/Ext/Blend/Apply, /VMC/Ext/OK or /VMC/Ext/T, or when a bone or
+the root repeats. Senders that begin frames with OK and T would be a frame late, so a bundle that completes the bones
+seen so far also ends it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from bunraku.capture.errors import UnreadableCapture
+from bunraku.capture.frame import MAX_BLENDSHAPES, CapturedFrame, CaptureSkeleton
+from bunraku.capture.humanoid import PARENTS_BY_BONE, ROOT_NAME
+from bunraku.capture.osc import parse_packet
+from bunraku.capture.vmc_messages import FrameEnd, Transform, Weight, read_message
+from bunraku.marionette.solver.vector import Quaternion, Vector, scale
+
+
+class VmcAssembler:
+    """Parser of VMC messages in any order; see the module for the end of a frame.
+
+    The time of a frame is that of /VMC/Ext/T in its bundle, else of the last one since the previous frame.
+    """
+
+    skeleton = CaptureSkeleton(PARENTS_BY_BONE, in_world=False)
+    time_resolution_s = 0.0
+
+    def __init__(self) -> None:
+        self._positions: dict[str, Vector] = {}
+        self._rotations: dict[str, Quaternion] = {}
+        self._time_s: float | None = None
+        self._scale = 1.0
+        self._bones_seen: set[str] = set()
+        self._set_weights: dict[str, float] = {}
+        self._applied_weights: dict[str, float] = {}
+
+    def feed(self, datagram: bytes) -> list[CapturedFrame]:
+        """Return the frames that `datagram` ends.
+
+        Raises `UnreadableCapture`; then no message of the datagram counts.
+        """
+        messages = [read_message(message) for message in parse_packet(datagram)]
+        self._check_blendshape_count(messages)
+        closed: list[CapturedFrame] = []
+        # the last of `closed` gets the time of a later message of this bundle, up to the next transform
+        awaits_time = False
+        for message in messages:
+            match message:
+                case Transform():
+                    awaits_time = False
+                    if message.bone in self._rotations:
+                        self._close_frame(closed)
+                    self._add_transform(message)
+                case Weight():
+                    self._set_weights[message.name] = message.weight
+                case FrameEnd(time_s=None):
+                    if message.applies_weights:
+                        self._applied_weights |= self._set_weights
+                        self._set_weights = {}
+                    awaits_time |= self._close_frame(closed)
+                case FrameEnd(time_s=time_s):
+                    trailing = self._time_s is None
+                    if self._has_bones() and trailing:
+                        self._time_s = time_s
+                        self._close_frame(closed)
+                    elif self._close_frame(closed) or not (awaits_time and closed[-1].sender_time_s is None):
+                        self._time_s = time_s
+                    else:
+                        closed[-1] = replace(closed[-1], sender_time_s=time_s)
+                    awaits_time = False
+        if len(messages) > 1 and self._bones_seen <= self._rotations.keys():
+            self._close_frame(closed)
+        return closed
+
+    def _check_blendshape_count(self, messages: list[Transform | Weight | FrameEnd | None]) -> None:
+        names = {message.name for message in messages if isinstance(message, Weight)}
+        count = len(names | self._set_weights.keys() | self._applied_weights.keys()) if names else 0
+        if count > MAX_BLENDSHAPES:
+            raise UnreadableCapture("Too many blendshapes", f"{count} names, expected at most {MAX_BLENDSHAPES}")
+
+    def _has_bones(self) -> bool:
+        return len(self._rotations) > (ROOT_NAME in self._rotations)
+
+    def _add_transform(self, transform: Transform) -> None:
+        if transform.scale is not None:
+            self._scale = transform.scale
+        self._positions[transform.bone] = transform.position
+        self._rotations[transform.bone] = transform.rotation
+
+    def _close_frame(self, closed: list[CapturedFrame]) -> bool:
+        """Append the pending frame and return True, if it has a bone."""
+        if not self._has_bones():
+            return False
+        positions = self._positions
+        if self._scale != 1.0:
+            positions = {b: p if b == ROOT_NAME else scale(p, self._scale) for b, p in positions.items()}
+        closed.append(CapturedFrame(positions, self._rotations, self._time_s, None, dict(self._applied_weights)))
+        self._bones_seen |= self._rotations.keys()
+        self._positions, self._rotations, self._time_s = {}, {}, None
+        return True
