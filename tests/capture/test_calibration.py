@@ -2,12 +2,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from bunraku.capture.calibration import MAX_CALIBRATION_FRAMES, calibrate
 from bunraku.capture.errors import UnreadableCapture
-from bunraku.capture.frame import CapturedFrame
+from bunraku.capture.frame import MAX_COORDINATE, CapturedFrame, CaptureSkeleton
+from bunraku.capture.mvn import MvnAssembler
+from bunraku.capture.retarget import Retargeter
 from bunraku.capture.vmc import VmcAssembler
 from bunraku.marionette.solver.vector import IDENTITY, scale
+from bunraku.motion import rotation
 from tests.capture.samples import sample_analysis, sample_frames
 
 SKELETON = VmcAssembler.skeleton
@@ -70,3 +75,36 @@ def test_frames_of_no_body_are_rejected() -> None:
             calibrate(SKELETON, [CapturedFrame(positions, rotations)])
     with pytest.raises(UnreadableCapture, match="No frames"):
         calibrate(SKELETON, [])
+
+
+@settings(max_examples=80)
+@given(
+    seed=st.integers(0, 1 << 30),
+    size=st.floats(-9.0, 5.0),
+    kept=st.floats(0.3, 1.0),
+    moving=st.booleans(),
+    skeleton=st.sampled_from([VmcAssembler.skeleton, MvnAssembler.skeleton]),
+)
+def test_any_frames_give_finite_poses_or_are_rejected(
+    seed: int, size: float, kept: float, moving: bool, skeleton: CaptureSkeleton
+) -> None:
+    chance = np.random.default_rng(seed)
+    joints = [joint for joint in skeleton.parents if chance.random() < kept]
+    frames = []
+    for _ in range(5):
+        places = (10.0**size * chance.normal(size=(len(joints), 3))).clip(-MAX_COORDINATE, MAX_COORDINATE)
+        turns = rotation.normalise(chance.normal(size=(len(joints), 4)) + (0.0 if moving else [9.0, 0.0, 0.0, 0.0]))
+        frames.append(
+            CapturedFrame(
+                {joint: (x, y, z) for joint, (x, y, z) in zip(joints, places.tolist(), strict=True)},
+                {joint: (w, x, y, z) for joint, (w, x, y, z) in zip(joints, turns.tolist(), strict=True)},
+            )
+        )
+    try:
+        retargeter = Retargeter(calibrate(skeleton, frames))
+    except UnreadableCapture:
+        return
+    for frame in frames:
+        pose = retargeter.retarget(frame)
+        assert np.isfinite(pose.root).all()
+        np.testing.assert_allclose(np.linalg.norm(pose.rotations, axis=-1), 1.0, atol=1e-9)

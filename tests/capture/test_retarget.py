@@ -12,6 +12,7 @@ from bunraku.capture.frame import CapturedFrame
 from bunraku.capture.retarget import Retargeter
 from bunraku.capture.vmc import VmcAssembler
 from bunraku.marionette.solver.vector import about_z, multiply
+from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
 from bunraku.motion.bvh import parse_bvh
 from tests.capture.samples import joint_distances_mm, sample_frames
@@ -87,6 +88,20 @@ def test_missing_joint_keeps_its_last_rotation() -> None:
     others = [joint for joint in range(18) if joint not in (elbow, elbow + 1)]
     np.testing.assert_allclose(pose.rotations[others], full.rotations[others], atol=1e-9)
     assert abs(full.rotations[elbow] @ pose.rotations[elbow]) < 1.0 - 1e-4
+
+
+def test_root_moves_and_turns_the_figure() -> None:
+    frames = sample_frames()
+    retargeter = Retargeter(calibrate(SKELETON, frames))
+    there = retargeter.retarget(frames[20])
+    turn = np.array([0.5**0.5, 0.0, 0.5**0.5, 0.0])
+    moved = CapturedFrame(
+        frames[20].positions | {"Root": (1.0, 0.0, 2.0)}, frames[20].rotations | {"Root": (turn[0], 0.0, turn[2], 0.0)}
+    )
+    pose = retargeter.retarget(moved)
+    np.testing.assert_allclose(pose.root - [1.0, 0.0, 2.0], rotation.rotate(turn, there.root), atol=1e-6)
+    np.testing.assert_allclose(pose.rotations[0], rotation.multiply(turn, there.rotations[0]), atol=1e-6)
+    np.testing.assert_allclose(pose.rotations[1:], there.rotations[1:], atol=1e-6)
 
 
 def test_blendshapes_pass_through() -> None:
