@@ -14,6 +14,8 @@ from bunraku.capture.errors import UnreadableCapture, quote_excerpt
 from bunraku.capture.frame import CapturedFrame, CaptureSkeleton, check_position, check_rotation, check_size
 from bunraku.marionette.solver.vector import Quaternion, Vector
 
+DEFAULT_PORT = 9763
+"""Port of MVN's network streamer."""
 MAX_PENDING_FRAMES = 8
 """Incomplete frames kept: their other datagrams are late or lost."""
 MAX_DATAGRAMS_PER_FRAME = 128

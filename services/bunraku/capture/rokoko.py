@@ -26,6 +26,8 @@ from bunraku.capture.frame import (
 from bunraku.capture.humanoid import PARENTS_BY_BONE, ROOT_NAME
 from bunraku.marionette.solver.vector import Quaternion, Vector, conjugate, multiply
 
+DEFAULT_PORT = 14043
+"""Port of Rokoko Studio's custom stream."""
 MAX_JSON_BYTES = 1 << 20
 """Maximum size of the decompressed JSON. Five actors with hands and faces take less than 200 kB."""
 VERSIONS = (3, 4)

@@ -19,6 +19,9 @@ from bunraku.capture.osc import parse_packet
 from bunraku.capture.vmc_messages import FrameEnd, Transform, Weight, read_message
 from bunraku.marionette.solver.vector import Quaternion, Vector, scale
 
+DEFAULT_PORT = 39539
+"""Port of a marionette by the protocol's convention."""
+
 
 class VmcAssembler:
     """Parser of VMC messages in any order; see the module for the end of a frame.
