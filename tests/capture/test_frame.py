@@ -10,9 +10,11 @@ from hypothesis import strategies as st
 from bunraku.capture.errors import UnreadableCapture
 from bunraku.capture.frame import (
     MAX_BLENDSHAPES,
+    CapturedFrame,
     check_position,
     check_rotation,
     check_weight,
+    date_frame,
     mirror_position,
     mirror_rotation,
 )
@@ -45,6 +47,15 @@ def test_weights_are_bounded() -> None:
     for name, value, count in (("", 0.0, 1), ("Joy", math.nan, 1), ("Joy", 0.0, MAX_BLENDSHAPES + 1)):
         with pytest.raises(UnreadableCapture, match="Invalid blendshape"):
             check_weight(name, value, count)
+
+
+def test_coarse_times_are_dropped() -> None:
+    frame = CapturedFrame({}, {})
+    assert date_frame(frame, None) is frame
+    assert date_frame(frame, 1e9).sender_time_s is None
+    dated = date_frame(frame, 1_000.0)
+    assert dated.sender_time_s == 1_000.0
+    assert np.spacing(np.float32(1_000.0)) <= dated.time_resolution_s <= 2 * np.spacing(np.float32(1_000.0))
 
 
 def test_mirroring_agrees_with_whole_arrays() -> None:

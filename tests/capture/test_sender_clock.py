@@ -43,19 +43,39 @@ def test_restarted_sender_begins_anew() -> None:
 
 @pytest.mark.parametrize("fps", [60.0, 240.0])
 def test_whole_milliseconds_are_smoothed_by_the_counter(fps: float) -> None:
-    clock = SenderClock(time_resolution_s=0.001)
+    clock = SenderClock()
     start = (1 << 32) - 100
     local = np.array(
-        [clock.to_local(round(1000 * n / fps) / 1000, n / fps, (start + n) % (1 << 32)) for n in range(600)]
+        [
+            clock.to_local(round(1000 * n / fps) / 1000, n / fps, (start + n) % (1 << 32), resolution_s=0.001)
+            for n in range(600)
+        ]
     )
     assert np.abs(np.diff(local)[100:] - 1.0 / fps).max() < 1.5e-4
 
 
-def test_irregular_counter_falls_back_to_the_senders_time() -> None:
-    clock = SenderClock(time_resolution_s=0.001)
-    times = [0.0, 0.016, 0.033, 0.3, 0.316, 0.333]
-    local = [clock.to_local(time_s, time_s, number) for number, time_s in enumerate(times)]
-    np.testing.assert_allclose(local, times, atol=1e-3)
+def test_single_precision_after_nine_hours_is_smoothed() -> None:
+    chance = np.random.default_rng(3)
+    clock = SenderClock()
+    kept = [n for n in range(900) if chance.random() > 0.05]
+    sent = [float(np.float32(32_400.0 + n / 60.0)) for n in kept]
+    local = np.array([clock.to_local(t, n / 60.0, resolution_s=2.0**-23 * t) for n, t in zip(kept, sent, strict=True)])
+    errors = np.diff(local) - np.diff(kept) / 60.0
+    assert np.abs(np.diff(sent) - np.diff(kept) / 60.0).max() > 0.9e-3
+    assert np.abs(errors[200:]).max() < 4e-4
+
+
+def test_unsteady_sender_keeps_its_times() -> None:
+    for counted in (True, False):
+        clock = SenderClock()
+        times = np.cumsum(np.random.default_rng(4).uniform(0.01, 0.05, 200))
+        local = np.array(
+            [
+                clock.to_local(time_s, time_s, number if counted else None, resolution_s=0.001)
+                for number, time_s in enumerate(times.tolist())
+            ]
+        )
+        np.testing.assert_allclose(local, times, atol=2.1e-3)
 
 
 @settings(max_examples=40)

@@ -80,6 +80,15 @@ def test_repeated_bone_ends_a_frame_without_end_messages() -> None:
     assert all(len(frame.rotations) == len(sample_performance().bones) for frame in frames)
 
 
+def test_duplicated_datagrams_do_not_split_frames() -> None:
+    assembler = VmcAssembler()
+    for messages in message_lists():
+        frames = [frame for message in messages for _ in range(2) for frame in assembler.feed(message.dgram)]
+        complete = [frame for frame in frames if len(frame.rotations) > 2]
+        assert [len(frame.rotations) for frame in complete][-1:] == [len(sample_performance().bones) + 1]
+    assert len(complete) == len(frames) == 1
+
+
 @settings(max_examples=50)
 @given(seed=st.integers(0, 1 << 30), loss=st.floats(0.0, 0.6), single=st.booleans())
 def test_loss_reordering_and_duplicates_never_break_frames(seed: int, loss: float, single: bool) -> None:

@@ -7,7 +7,7 @@ and any unit will do: the calibration detects them. Parsers of left-handed proto
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import fsum, isfinite, sqrt
 from typing import Protocol
 
@@ -20,6 +20,10 @@ MAX_COORDINATE = 1e6
 """Bound of coordinates in the sender's unit: a kilometre in millimetres."""
 MAX_LENGTH_DEVIATION = 0.01
 """Largest deviation of a quaternion's length from one. Senders round to 32 bits or to four decimals."""
+SINGLE_PRECISION = 2.0**-23
+"""Resolution of a 32-bit float, as a share of its value."""
+MAX_TIME_RESOLUTION_S = 0.004
+"""Coarser times are no better than arrivals: those of 32-bit seconds after nine hours."""
 MAX_BLENDSHAPES = 512
 MAX_BLENDSHAPE_NAME_LENGTH = 128
 
@@ -41,8 +45,9 @@ class CaptureSkeleton:
 class CapturedFrame:
     """One frame; joints that the sender omitted or the network lost are absent.
 
-    `sender_time_s` is the sender's clock, `sequence` the sender's frame counter (modulo 2**32); None if the protocol
-    has none or the message was lost. `blendshapes` are weights by name, passed through.
+    `sender_time_s` is the sender's clock and `time_resolution_s` its resolution, `sequence` the sender's frame counter
+    (modulo 2**32); None if the protocol has none or the message was lost. `blendshapes` are weights by name, passed
+    through.
     """
 
     positions: dict[str, Vector]
@@ -50,16 +55,13 @@ class CapturedFrame:
     sender_time_s: float | None = None
     sequence: int | None = None
     blendshapes: dict[str, float] = field(default_factory=dict)
+    time_resolution_s: float = 0.0
 
 
 class FrameAssembler(Protocol):
-    """Parser of one protocol: datagrams in, complete frames out.
-
-    `time_resolution_s` is the resolution of the sender's times, 0 if it is fine.
-    """
+    """Parser of one protocol: datagrams in, complete frames out."""
 
     skeleton: CaptureSkeleton
-    time_resolution_s: float
 
     def feed(self, datagram: bytes) -> list[CapturedFrame]:
         """Return the frames that `datagram` completes.
@@ -111,6 +113,17 @@ def check_weight(name: str, value: float, count: int) -> float:
             hint=f"send at most {MAX_BLENDSHAPES} finite weights, names up to {MAX_BLENDSHAPE_NAME_LENGTH} long",
         )
     return value
+
+
+def date_frame(frame: CapturedFrame, time_s: float | None) -> CapturedFrame:
+    """Return `frame` with the sender's time in single precision, as OSC senders mostly send it.
+
+    A time of None or too coarse a resolution is left out.
+    """
+    resolution_s = SINGLE_PRECISION * abs(time_s or 0.0)
+    if time_s is None or resolution_s > MAX_TIME_RESOLUTION_S:
+        return frame
+    return replace(frame, sender_time_s=time_s, time_resolution_s=resolution_s)
 
 
 def mirror_position(position: Vector) -> Vector:

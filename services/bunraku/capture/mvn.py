@@ -71,7 +71,6 @@ class MvnAssembler:
     """Parser of MVN datagrams for one character: `character`, or the first one that is received."""
 
     skeleton = CaptureSkeleton(dict(_SEGMENTS), in_world=True)
-    time_resolution_s = 0.001
 
     def __init__(self, character: int | None = None) -> None:
         self._character = character
@@ -103,7 +102,11 @@ class MvnAssembler:
         if frame.datagram_count is None or len(frame.datagrams) < frame.datagram_count:
             return []
         del self._pending[sample]
-        return [CapturedFrame(frame.positions, frame.rotations, time_ms / 1000.0, sample)] if frame.rotations else []
+        return (
+            [CapturedFrame(frame.positions, frame.rotations, time_ms / 1000.0, sample, time_resolution_s=0.001)]
+            if frame.rotations
+            else []
+        )
 
     def _add_part(self, sample: int, counter: int) -> _PendingFrame:
         """Return the pending frame of a sample, with the datagram `counter` noted; drop the oldest of too many."""

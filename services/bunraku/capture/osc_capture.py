@@ -14,6 +14,7 @@ from bunraku.capture.frame import (
     check_position,
     check_rotation,
     check_weight,
+    date_frame,
 )
 from bunraku.capture.humanoid import PARENTS_BY_BONE, standard_offsets
 from bunraku.capture.osc import OscMessage, parse_packet
@@ -46,8 +47,6 @@ class OscAssembler:
     A frame ends with the address of kind `frame_end`, when a joint's rotation or position repeats, and with a bundle
     that completes the rotations seen so far.
     """
-
-    time_resolution_s = 0.0
 
     def __init__(self, mapping: OscMapping) -> None:
         self.skeleton = CaptureSkeleton(PARENTS_BY_BONE, mapping.in_world, standard_offsets())
@@ -106,7 +105,8 @@ class OscAssembler:
         pending = self._pending
         if not pending.rotations:
             return
-        closed.append(CapturedFrame(pending.positions, pending.rotations, pending.time_s, None, pending.blendshapes))
+        frame = CapturedFrame(pending.positions, pending.rotations, blendshapes=pending.blendshapes)
+        closed.append(date_frame(frame, pending.time_s))
         self._seen |= pending.rotations.keys()
         self._pending = _PendingFrame(blendshapes=dict(pending.blendshapes))
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from bunraku.capture.frame import CapturedFrame
 from bunraku.capture.sender_clock import ArrivalClock, SenderClock
+from bunraku.marionette.solver.vector import Quaternion
 
 MAX_WAIT_S = 0.1
 """Longest wait for a missing frame."""
@@ -48,16 +49,16 @@ class ReorderStatistics:
 
 
 class ReorderBuffer:
-    """Buffer of captured frames, driven by arrival times; `time_resolution_s` is that of the sender's times."""
+    """Buffer of captured frames, driven by arrival times."""
 
-    def __init__(self, time_resolution_s: float = 0.0) -> None:
+    def __init__(self) -> None:
         self.statistics = ReorderStatistics()
-        self._sender_clock = SenderClock(time_resolution_s)
+        self._sender_clock = SenderClock()
         self._arrival_clock = ArrivalClock()
         # sample time, order of arrival, arrival time, frame
         self._waiting: list[tuple[float, int, float, CapturedFrame]] = []
         self._arrivals = 0
-        self._recent: deque[tuple[float | None, int | None]] = deque(maxlen=RECENT_FRAMES)
+        self._recent: deque[tuple[float | None, int | None, dict[str, Quaternion]]] = deque(maxlen=RECENT_FRAMES)
         self._releases: deque[tuple[float, float]] = deque(maxlen=RECENT_FRAMES)
         self._period_s: float | None = None
         self._wait_s = 0.0
@@ -66,14 +67,17 @@ class ReorderBuffer:
     def push(self, frame: CapturedFrame, arrival_s: float) -> list[TimedFrame]:
         """Return the frames that are released when `frame` arrives."""
         self._advance(arrival_s)
-        key = (frame.sender_time_s, frame.sequence)
-        if key != (None, None):
+        if frame.sender_time_s is not None or frame.sequence is not None:
+            # coarse times may repeat, but not with the same pose
+            key = (frame.sender_time_s, frame.sequence, frame.rotations)
             if key in self._recent:
                 self.statistics.duplicates += 1
                 return self.poll(arrival_s)
             self._recent.append(key)
         if frame.sender_time_s is not None:
-            time_s = self._sender_clock.to_local(frame.sender_time_s, arrival_s, frame.sequence)
+            time_s = self._sender_clock.to_local(
+                frame.sender_time_s, arrival_s, frame.sequence, frame.time_resolution_s
+            )
         else:
             time_s = self._arrival_clock.to_local(arrival_s)
         if self._releases and time_s < self._releases[-1][0] + MIN_INTERVAL_S:

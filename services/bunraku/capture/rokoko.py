@@ -77,7 +77,6 @@ class RokokoAssembler:
     """Parser of the stream for one actor: the one named `actor`, or the first with a body."""
 
     skeleton = CaptureSkeleton(_PARENTS, in_world=True)
-    time_resolution_s = 0.0
 
     def __init__(self, actor: str | None = None) -> None:
         self._actor = actor

@@ -19,8 +19,10 @@ SETTLING_S = 1.0
 """Time after the start in which the offset follows its estimate at once."""
 MAX_BACKWARD_S, MAX_DELAY_S = 0.5, 2.0
 """A frame earlier or later than expected by more than these shows that the sender's clock was set anew."""
-FIT_FRAMES = 64
-"""Frames over which coarse times are smoothed."""
+FINE_RESOLUTION_S = 1e-4
+"""Times of a finer resolution are not smoothed."""
+FIT_FRAMES, MIN_FIT_FRAMES = 64, 8
+"""Most and fewest frames over which coarse times are smoothed."""
 SEQUENCE_RANGE = 1 << 32
 
 INITIAL_FRAMES = 16
@@ -33,22 +35,23 @@ _ARRIVAL_GAIN, _PERIOD_GAIN = 0.1, 0.005
 class SenderClock:
     """Conversion of the sender's times to the local clock, from the arrivals of frames.
 
-    `time_resolution_s` is that of the sender's times. If they are coarse and frames are counted, the times are
-    smoothed: a 60 Hz sender with whole milliseconds would otherwise have intervals of 16 and 17 ms.
+    Coarse times of a steady sender are smoothed: a sender of 60 frames/s with whole milliseconds, as MVN's, would
+    otherwise have intervals of 16 and 17 ms; the 32-bit seconds of VMC are multiples of 2 ms after five hours.
     """
 
-    def __init__(self, time_resolution_s: float = 0.0) -> None:
-        self._resolution_s = time_resolution_s
+    def __init__(self) -> None:
         self._start_s = 0.0
         self._newest_s = 0.0
         self._least_delay_s: float | None = None
         self._offset_s = 0.0
         self._counted: deque[tuple[int, float]] = deque(maxlen=FIT_FRAMES)
 
-    def to_local(self, sender_s: float, arrival_s: float, sequence: int | None = None) -> float:
-        """Return the sample time, on the local clock, of a frame with the sender's time."""
-        if sequence is not None and self._resolution_s > 0.0:
-            sender_s = self._smooth_time(sender_s, sequence)
+    def to_local(
+        self, sender_s: float, arrival_s: float, sequence: int | None = None, resolution_s: float = 0.0
+    ) -> float:
+        """Return the sample time, on the local clock, of a frame with the sender's time and frame counter."""
+        if resolution_s > FINE_RESOLUTION_S:
+            sender_s = self._smooth_time(sender_s, sequence, resolution_s)
         delay_s = arrival_s - sender_s
         expected = self._least_delay_s
         if expected is None or not -MAX_BACKWARD_S <= delay_s - expected <= MAX_DELAY_S:
@@ -66,17 +69,30 @@ class SenderClock:
             self._offset_s += correction_s
         return sender_s + self._offset_s
 
-    def _smooth_time(self, sender_s: float, sequence: int) -> float:
-        """Return the time on the line through the last frames' counters and times, if all are near it."""
-        newest = self._counted[-1][0] if self._counted else sequence
-        # the counter continued beyond its range
-        count = newest + (sequence - newest + SEQUENCE_RANGE // 2) % SEQUENCE_RANGE - SEQUENCE_RANGE // 2
-        if self._counted and abs(count - newest) > FIT_FRAMES:
-            self._counted.clear()
-        if not self._counted or count > newest:
+    def _smooth_time(self, sender_s: float, sequence: int | None, resolution_s: float) -> float:
+        """Return the time on the line through the last frames' counters and times, if it agrees with them."""
+        count = self._count_frame(sender_s, sequence)
+        if not self._counted or count > self._counted[-1][0]:
             self._counted.append((count, sender_s))
         fitted_s = _fit_line(self._counted, count)
-        return fitted_s if abs(fitted_s - sender_s) <= self._resolution_s else sender_s
+        if abs(fitted_s - sender_s) <= resolution_s:
+            return fitted_s
+        # not a steady sender, or frames were counted wrongly
+        self._counted.clear()
+        return sender_s
+
+    def _count_frame(self, sender_s: float, sequence: int | None) -> int:
+        """Return the number of a frame: its counter continued beyond its range, else by the time since the last."""
+        if not self._counted:
+            return sequence or 0
+        newest, newest_s = self._counted[-1]
+        if sequence is not None:
+            return newest + (sequence - newest + SEQUENCE_RANGE // 2) % SEQUENCE_RANGE - SEQUENCE_RANGE // 2
+        if len(self._counted) < MIN_FIT_FRAMES:
+            return newest + 1
+        oldest, oldest_s = self._counted[0]
+        period_s = (newest_s - oldest_s) / (newest - oldest)
+        return newest + round(min((sender_s - newest_s) / period_s, 1e6)) if period_s > 0.0 else newest + 1
 
 
 def _fit_line(points: Sequence[tuple[int, float]], x: int) -> float:

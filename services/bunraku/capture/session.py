@@ -31,7 +31,7 @@ class CaptureSession:
         self.calibration: Calibration | None = None
         self._assembler = assembler
         self._calibration_s = calibration_s
-        self._buffer = ReorderBuffer(assembler.time_resolution_s)
+        self._buffer = ReorderBuffer()
         self._retargeter: Retargeter | None = None
         self._collected: list[CapturedFrame] | None = []
         self._calibration_start_s: float | None = None

@@ -10,10 +10,8 @@ seen so far also ends it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from bunraku.capture.errors import UnreadableCapture
-from bunraku.capture.frame import MAX_BLENDSHAPES, CapturedFrame, CaptureSkeleton
+from bunraku.capture.frame import MAX_BLENDSHAPES, CapturedFrame, CaptureSkeleton, date_frame
 from bunraku.capture.humanoid import PARENTS_BY_BONE, ROOT_NAME
 from bunraku.capture.osc import parse_packet
 from bunraku.capture.vmc_messages import FrameEnd, Transform, Weight, read_message
@@ -30,7 +28,6 @@ class VmcAssembler:
     """
 
     skeleton = CaptureSkeleton(PARENTS_BY_BONE, in_world=False)
-    time_resolution_s = 0.0
 
     def __init__(self) -> None:
         self._positions: dict[str, Vector] = {}
@@ -55,9 +52,7 @@ class VmcAssembler:
             match message:
                 case Transform():
                     awaits_time = False
-                    if message.bone in self._rotations:
-                        self._close_frame(closed)
-                    self._add_transform(message)
+                    self._add_transform(message, closed)
                 case Weight():
                     self._set_weights[message.name] = message.weight
                 case FrameEnd(time_s=None):
@@ -66,18 +61,37 @@ class VmcAssembler:
                         self._set_weights = {}
                     awaits_time |= self._close_frame(closed)
                 case FrameEnd(time_s=time_s):
-                    trailing = self._time_s is None
-                    if self._has_bones() and trailing:
-                        self._time_s = time_s
-                        self._close_frame(closed)
-                    elif self._close_frame(closed) or not (awaits_time and closed[-1].sender_time_s is None):
-                        self._time_s = time_s
-                    else:
-                        closed[-1] = replace(closed[-1], sender_time_s=time_s)
+                    self._add_time(time_s, closed, awaits_time)
                     awaits_time = False
-        if len(messages) > 1 and self._bones_seen <= self._rotations.keys():
+        if len(messages) > 1 and self._is_complete():
             self._close_frame(closed)
         return closed
+
+    def _add_transform(self, transform: Transform, closed: list[CapturedFrame]) -> None:
+        """Add a bone, to the next frame if the pending one has it.
+
+        A copy of the last bone, or any copy in an incomplete frame, is a duplicate.
+        """
+        bone, position, rotation, factor = transform
+        if bone in self._rotations:
+            copied = (position, rotation) == (self._positions[bone], self._rotations[bone])
+            if not copied or (self._is_complete() and bone != next(reversed(self._rotations))):
+                self._close_frame(closed)
+        if factor is not None:
+            self._scale = factor
+        self._positions[bone] = position
+        self._rotations[bone] = rotation
+
+    def _add_time(self, time_s: float | None, closed: list[CapturedFrame], awaits_time: bool) -> None:
+        """Date the pending frame, unless it has a time: then that of a closed frame, or of the next one."""
+        if self._time_s is None and self._has_bones():
+            self._time_s = time_s
+            self._close_frame(closed)
+        elif awaits_time and not self._has_bones() and closed[-1].sender_time_s is None:
+            closed[-1] = date_frame(closed[-1], time_s)
+        else:
+            self._close_frame(closed)
+            self._time_s = time_s
 
     def _check_blendshape_count(self, messages: list[Transform | Weight | FrameEnd | None]) -> None:
         names = {message.name for message in messages if isinstance(message, Weight)}
@@ -88,11 +102,9 @@ class VmcAssembler:
     def _has_bones(self) -> bool:
         return len(self._rotations) > (ROOT_NAME in self._rotations)
 
-    def _add_transform(self, transform: Transform) -> None:
-        if transform.scale is not None:
-            self._scale = transform.scale
-        self._positions[transform.bone] = transform.position
-        self._rotations[transform.bone] = transform.rotation
+    def _is_complete(self) -> bool:
+        """Return whether the pending frame has all bones seen so far."""
+        return self._bones_seen <= self._rotations.keys()
 
     def _close_frame(self, closed: list[CapturedFrame]) -> bool:
         """Append the pending frame and return True, if it has a bone."""
@@ -101,7 +113,8 @@ class VmcAssembler:
         positions = self._positions
         if self._scale != 1.0:
             positions = {b: p if b == ROOT_NAME else scale(p, self._scale) for b, p in positions.items()}
-        closed.append(CapturedFrame(positions, self._rotations, self._time_s, None, dict(self._applied_weights)))
+        frame = CapturedFrame(positions, self._rotations, blendshapes=dict(self._applied_weights))
+        closed.append(date_frame(frame, self._time_s))
         self._bones_seen |= self._rotations.keys()
         self._positions, self._rotations, self._time_s = {}, {}, None
         return True
