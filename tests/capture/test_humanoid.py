@@ -7,7 +7,7 @@ from bunraku.capture.humanoid import (
     FIGURE_JOINTS,
     PARENTS_BY_BONE,
     ROOT_NAME,
-    standard_offsets,
+    standard_t_pose,
 )
 from bunraku.motion.skeleton import JOINT_INDEX
 
@@ -25,15 +25,15 @@ def test_bones_of_the_figure_exist() -> None:
     assert set(FIGURE_JOINTS.values()) == JOINT_INDEX.keys() - {"humanoid_root"}
 
 
-def test_standard_offsets_are_a_t_pose() -> None:
-    offsets = standard_offsets()
-    assert offsets.keys() == FIGURE_JOINTS.keys()
+def test_standard_figure_stands_in_a_t_pose() -> None:
+    places = {bone: np.array(place) for bone, place in standard_t_pose().items()}
+    assert places.keys() > FIGURE_JOINTS.keys()
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
-        for bone in ("LowerArm", "Hand"):
-            x, y, z = offsets[side + bone]
+        for above, below in (("UpperArm", "LowerArm"), ("LowerArm", "Hand")):
+            x, y, z = places[side + below] - places[side + above]
             assert sign * x > 0.2
             assert abs(y) < 0.02
             assert abs(z) < 0.06
-        np.testing.assert_array_less(offsets[side + "LowerLeg"][1], -0.3)
-        assert sign * offsets[side + "UpperArm"][0] > 0.15
-    assert offsets["Hips"][1] > 0.8
+        assert places[side + "LowerLeg"][1] < places[side + "UpperLeg"][1] - 0.3
+        assert 0.0 < sign * places[side + "Shoulder"][0] < sign * places[side + "UpperArm"][0]
+    assert places["Hips"][1] < places["Spine"][1] < places["Chest"][1] < places["Neck"][1] < places["Head"][1]

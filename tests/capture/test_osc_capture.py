@@ -12,9 +12,12 @@ from bunraku.capture.osc_capture import OscAssembler
 from bunraku.capture.osc_mapping import parse_mapping
 from bunraku.motion import rotation
 from bunraku.motion.bvh_writer import euler_zxy
+from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
 from bunraku.motion.unity_axes import mirror_rotations
 from tests.capture.samples import joint_distances_mm, retarget_all, sample_analysis, sample_performance
 from tests.capture.vmc_performer import make_bundle, make_message
+
+LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
 
 
 def assembler_of(*entries: dict[str, Any], space: str = "parent") -> OscAssembler:
@@ -68,6 +71,22 @@ def test_sender_without_positions_gets_the_standard_figure() -> None:
     np.testing.assert_allclose(
         np.abs(np.sum(poses[-1].rotations[3] * mirror_rotations(performance.rotations[9, knee]))), 1.0, atol=0.03
     )
+
+
+def test_rotation_of_an_optional_bone_moves_the_arms_of_a_sender_without_positions() -> None:
+    identity = (0.0, 0.0, 0.0, 1.0)
+    turned = (0.0, 0.5**0.5, 0.0, 0.5**0.5)
+    bones = ("Hips", "Spine", "Chest", "Head", *(side + limb for side in ("Left", "Right") for limb in LIMBS))
+    assembler = assembler_of({**ROTATION, "axes": "x y z"})
+    frames = []
+    for chest in (identity, turned):
+        messages = [make_message(f"/r/{bone}", *(chest if bone == "Chest" else identity)) for bone in bones]
+        frames += assembler.feed(make_bundle(messages))
+    figure, poses = retarget_all(assembler.skeleton, frames)
+    for pose, axis, sign in zip(poses, (0, 2), (1.0, -1.0), strict=True):
+        placed, _ = world_transforms(figure, pose.root, pose.rotations)
+        hands = placed[JOINT_INDEX["l_wrist"]] - placed[JOINT_INDEX["r_wrist"]]
+        assert sign * hands[axis] > 1.2
 
 
 def test_axes_convert_rotations_of_right_and_left_handed_senders() -> None:

@@ -1,4 +1,4 @@
-"""Playback of a BVH file in real time, as if it were captured live."""
+"""Playback of a BVH file in real time, in place of a live capture."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ import numpy as np
 from bunraku.capture.errors import UnreadableCapture
 from bunraku.capture.frame import CapturedFrame, CaptureSkeleton
 from bunraku.capture.source_pose import SourcePose, find_parents
-from bunraku.marionette.solver.vector import IDENTITY, ZERO, Quaternion, Vector
+from bunraku.marionette.solver.vector import IDENTITY, ZERO, Quaternion, Vector, subtract
 from bunraku.motion.analysis import SourceFit, fit_source
 from bunraku.motion.bvh import Bvh
 from bunraku.motion.bvh_writer import euler_zxy
@@ -64,7 +64,7 @@ def calibrate(skeleton: CaptureSkeleton, frames: Sequence[CapturedFrame]) -> Cal
     chosen = np.unique(np.linspace(0, len(frames) - 1, MAX_CALIBRATION_FRAMES).astype(np.int64))
     frames = [frames[index] for index in chosen]
     rotated = set().union(*(frame.rotations.keys() for frame in frames))
-    placed = set(skeleton.default_offsets).union(*(frame.positions.keys() for frame in frames))
+    placed = set(skeleton.t_pose).union(*(frame.positions.keys() for frame in frames))
     joints = [name for name in skeleton.parents if name in rotated and name in placed]
     if not joints:
         raise UnreadableCapture("No joints", "no frame has a joint with rotation and position")
@@ -99,9 +99,12 @@ def _track_joints(
 
     A joint has its first known transform in the frames before it.
     """
-    defaults = skeleton.default_offsets
+    places = [skeleton.t_pose.get(joint, ZERO) for joint in joints]
     initial: tuple[list[Vector], list[Quaternion]] = (
-        [defaults.get(joint, ZERO) for joint in joints],
+        [
+            subtract(place, places[parent]) if parent >= 0 else place
+            for place, parent in zip(places, find_parents(skeleton, joints), strict=True)
+        ],
         [IDENTITY for _ in joints],
     )
     pose = SourcePose(skeleton, joints, *initial)

@@ -32,13 +32,13 @@ MAX_BLENDSHAPE_NAME_LENGTH = 128
 class CaptureSkeleton:
     """Joints of a capture format, parents before children, each with its parent.
 
-    Positions and rotations of frames are in the world if `in_world`, else relative to the parent. `default_offsets`
-    are positions relative to the parent in the T-pose, of joints whose positions the sender may omit.
+    Positions and rotations of frames are in the world if `in_world`, else relative to the parent. `t_pose` are the
+    positions in the world, in the T-pose, of joints whose positions the sender may omit.
     """
 
     parents: Mapping[str, str | None]
     in_world: bool
-    default_offsets: Mapping[str, Vector] = field(default_factory=dict)
+    t_pose: Mapping[str, Vector] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ Source: Unity Scripting API, `HumanBodyBones`. An optional bone that a sender om
 from __future__ import annotations
 
 from bunraku.marionette.solver.vector import Vector
-from bunraku.motion.skeleton import JOINT_INDEX, PARENTS, standard_figure
+from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, JOINTS, PARENTS, standard_figure
 
 ROOT_NAME = "Root"
 """Transform above the hips, which moves the whole avatar."""
@@ -65,29 +65,29 @@ FIGURE_JOINTS: dict[str, str] = {"Hips": "sacroiliac", "Spine": "vl5", "Head": "
         ("{}Hand", "{}_wrist"),
     )
 }
-"""Joint of the figure for each bone that has one."""
+"""Joints of the figure by bone."""
 
 
-def standard_offsets() -> dict[str, Vector]:
-    """Return the position of each bone of `FIGURE_JOINTS` from its parent bone in the T-pose of the standard figure.
+CHEST_SHARE = 0.4
+"""Height of the chest, as a share of the way from the spine to the middle of the shoulders."""
+CLAVICLE_SHARE = 0.25
+"""Position of a shoulder bone, as a share of the way from the middle of the shoulders to the upper arm."""
 
-    Metres, in the figure's axes. A parent without a joint of its own counts as the next one above that has one.
-    """
+
+def standard_t_pose() -> dict[str, Vector]:
+    """Return the positions of the body's bones in the T-pose of the standard figure, metres, in the figure's axes."""
     figure = standard_figure()
-    place: dict[str, tuple[float, float, float]] = {}
     positions = figure.offsets.copy()
-    for joint in range(1, len(positions)):
+    for joint in range(1, JOINT_COUNT):
         x, y, z = positions[joint].tolist()
-        name = next((name for name, index in JOINT_INDEX.items() if index == joint), "")
-        if name[2:] in ("elbow", "wrist"):
+        if JOINTS[joint][2:] in ("elbow", "wrist"):
             # the hanging arm raised sideways
-            x, y = (-y, x) if name[0] == "l" else (y, -x)
+            x, y = (-y, x) if JOINTS[joint].startswith("l_") else (y, -x)
         positions[joint] = (x, y, z) + positions[PARENTS[joint]]
-    for bone, joint_name in FIGURE_JOINTS.items():
-        parent = PARENTS_BY_BONE[bone]
-        while parent is not None and parent not in FIGURE_JOINTS:
-            parent = PARENTS_BY_BONE[parent]
-        above = positions[JOINT_INDEX[FIGURE_JOINTS[parent]]] if parent is not None else 0.0
-        x, y, z = (positions[JOINT_INDEX[joint_name]] - above).tolist()
-        place[bone] = (x, y, z)
-    return place
+    bones = {bone: positions[JOINT_INDEX[joint]] for bone, joint in FIGURE_JOINTS.items()}
+    middle = 0.5 * (bones["LeftUpperArm"] + bones["RightUpperArm"])
+    bones["Chest"] = bones["UpperChest"] = bones["Spine"] + CHEST_SHARE * (middle - bones["Spine"])
+    bones["Neck"] = middle
+    for side in ("Left", "Right"):
+        bones[f"{side}Shoulder"] = middle + CLAVICLE_SHARE * (bones[f"{side}UpperArm"] - middle)
+    return {bone: (x, y, z) for bone, (x, y, z) in ((bone, place.tolist()) for bone, place in bones.items())}

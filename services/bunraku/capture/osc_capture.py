@@ -16,7 +16,7 @@ from bunraku.capture.frame import (
     check_weight,
     date_frame,
 )
-from bunraku.capture.humanoid import PARENTS_BY_BONE, standard_offsets
+from bunraku.capture.humanoid import PARENTS_BY_BONE, standard_t_pose
 from bunraku.capture.osc import OscMessage, parse_packet
 from bunraku.capture.osc_mapping import (
     JOINT_PLACEHOLDER,
@@ -49,7 +49,7 @@ class OscAssembler:
     """
 
     def __init__(self, mapping: OscMapping) -> None:
-        self.skeleton = CaptureSkeleton(PARENTS_BY_BONE, mapping.in_world, standard_offsets())
+        self.skeleton = CaptureSkeleton(PARENTS_BY_BONE, mapping.in_world, standard_t_pose())
         self._literal: dict[str, list[MappingEntry]] = {}
         self._patterns: list[tuple[str, str, MappingEntry]] = []
         for entry in mapping.entries:
