@@ -1,21 +1,21 @@
-"""Coverage-guided fuzzing in a separate process: `python -m tests.fuzz CORPUS COUNTS [options of libFuzzer]`.
+"""Coverage-guided fuzzing in a separate process: `python -m tests.fuzz GROUP CORPUS COUNTS [options of libFuzzer]`.
 
-The first byte of an input selects the target. The Python code of the packages is instrumented. Compiled code cannot be,
-but its bounds are checked if NUMBA_BOUNDSCHECK=1. The file COUNTS holds an int64 for each target and outcome (rejected,
-accepted). A failure ends the process with its traceback on stdout and the bytes of the input on stderr.
+GROUP is "contract", whose inputs select the target by their first byte, or the name of one target of live capture. The
+Python code of the packages is instrumented. Compiled code cannot be, but its bounds are checked if
+NUMBA_BOUNDSCHECK=1. The file COUNTS holds an int64 for each target and outcome (rejected, accepted). A failure ends the
+process with its traceback on stdout and the bytes of the input on stderr.
 """
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import atheris
 import numpy as np
 
-import bunraku.codec._kernels  # noqa: F401 - compiled code, imported before the instrumentation starts
-
-INSTRUMENTED = [
+CONTRACT = [
     "bunraku.codec.audio",
     "bunraku.codec.coefficients",
     "bunraku.codec.skeleton_description",
@@ -27,22 +27,40 @@ INSTRUMENTED = [
     "bunraku.wire.messages",
     "tests.fuzz.targets",
 ]
-
-with atheris.instrument_imports(include=INSTRUMENTED, enable_loader_override=False):
-    from tests.fuzz.targets import TARGETS, load_seeds
+CAPTURE = [
+    "bunraku.capture.frame",
+    "bunraku.capture.osc",
+    "bunraku.capture.vmc_messages",
+    "bunraku.capture.vmc",
+    "bunraku.capture.mvn",
+    "bunraku.capture.rokoko",
+    "bunraku.capture.osc_mapping",
+    "bunraku.capture.osc_capture",
+    "tomllib",
+    "tests.fuzz.capture_targets",
+]
 
 
 def main() -> None:
-    corpus, file, *options = sys.argv[1:]
+    group, corpus, file, *options = sys.argv[1:]
+    if group == "contract":
+        import bunraku.codec._kernels  # noqa: F401 - compiled code, imported before the instrumentation starts
+    with atheris.instrument_imports(include=CONTRACT if group == "contract" else CAPTURE, enable_loader_override=False):
+        module = import_module("tests.fuzz.targets" if group == "contract" else "tests.fuzz.capture_targets")
+    targets, seeds = module.TARGETS, module.load_seeds()
     # libFuzzer ends the process without returning to Python, so counts are written to the file immediately
-    counts = np.memmap(file, np.int64, "w+", shape=(len(TARGETS), 2))
-    for number, (target, data) in enumerate(load_seeds()):
-        (Path(corpus) / f"{number:03}").write_bytes(bytes([target]) + data)
+    counts = np.memmap(file, np.int64, "w+", shape=(len(targets), 2))
+    only = None if group == "contract" else [target.__name__ for target in targets].index(group)
+    for number, (target, data) in enumerate(seeds):
+        if only is None or target == only:
+            (Path(corpus) / f"{number:03}").write_bytes(data if only is not None else bytes([target]) + data)
 
     def run_target(data: bytes) -> None:
-        if data:
-            number = data[0] % len(TARGETS)
-            counts[number, int(TARGETS[number](data[1:]))] += 1
+        if only is not None:
+            counts[only, int(targets[only](data))] += 1
+        elif data:
+            number = data[0] % len(targets)
+            counts[number, int(targets[number](data[1:]))] += 1
 
     atheris.Setup([sys.argv[0], corpus, *options], run_target)
     atheris.Fuzz()

@@ -16,32 +16,19 @@ from hypothesis import strategies as st
 
 from bunraku.runtime.compile_cache import compile_cache_folder
 from bunraku.wire.messages import Description
+from tests.fuzz.corruption import hostile_inputs
 from tests.fuzz.targets import TARGETS, TRACK_DESCRIPTIONS, load_seeds
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = 1_000
 RUNS = 3_000
-MAX_SHOWN_BYTES = 4_096
-"""Maximum size of a seed for Hypothesis, which prints failing inputs, bytes."""
 
 SEEDS = load_seeds()
-EDITS = st.lists(st.tuples(st.integers(0, 1 << 16), st.integers(0, 255)), max_size=8)
 
 
-def corrupt(data: bytes, edits: list[tuple[int, int]], kept_share: float, tail: bytes) -> bytes:
-    """Return `data` with bytes replaced, cut to a share of its length, and followed by `tail`."""
-    octets = bytearray(data)
-    for position, value in edits:
-        if octets:
-            octets[position % len(octets)] = value
-    return bytes(octets[: round(kept_share * len(octets))]) + tail
-
-
-def hostile_inputs(number: int) -> st.SearchStrategy[bytes]:
+def golden_inputs(number: int) -> st.SearchStrategy[bytes]:
     """Return a strategy of inputs for a target: random bytes and corrupted golden bytes."""
-    golden = st.sampled_from([data for target, data in SEEDS if target == number and len(data) <= MAX_SHOWN_BYTES])
-    kept = st.just(1.0) | st.floats(0, 1)
-    return st.binary(max_size=600) | st.builds(corrupt, golden, EDITS, kept, st.binary(max_size=40))
+    return hostile_inputs([data for target, data in SEEDS if target == number])
 
 
 VALUES = st.one_of(
@@ -65,11 +52,11 @@ HOSTILE_DESCRIPTIONS = st.builds(
 @pytest.mark.parametrize(
     ("number", "inputs"),
     [
-        (0, hostile_inputs(0)),
-        (1, hostile_inputs(1)),
-        (2, hostile_inputs(2)),
+        (0, golden_inputs(0)),
+        (1, golden_inputs(1)),
+        (2, golden_inputs(2)),
         (2, HOSTILE_DESCRIPTIONS),
-        (3, hostile_inputs(3)),
+        (3, golden_inputs(3)),
     ],
     ids=["blocks", "dancers", "messages", "descriptions", "audio"],
 )
@@ -110,7 +97,7 @@ def test_coverage_guided_input_is_accepted_or_rejected_as_declared(
     # the timeout of 60 s per input detects a hang; the cost of a block is bounded by its sizes, in the targets
     options = [f"-runs={RUNS}", "-timeout=60", "-rss_limit_mb=2048", f"-artifact_prefix={tmp_path}/"]
     result = subprocess.run(
-        [sys.executable, "-m", "tests.fuzz", corpus, file, *options],
+        [sys.executable, "-m", "tests.fuzz", "contract", corpus, file, *options],
         cwd=REPOSITORY,
         env=os.environ | {"NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": checked_kernels},
         capture_output=True,

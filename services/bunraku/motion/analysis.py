@@ -12,12 +12,11 @@ from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.fit import FigureFit
 from bunraku.motion.limb_fit import fit_arm, fit_leg
 from bunraku.motion.name_mapping import common_ancestor, map_by_name
-from bunraku.motion.rest_pose import find_rest_pose, resolve_sides, sample_frames
+from bunraku.motion.rest_pose import RestPose, find_rest_pose, resolve_sides, sample_frames
 from bunraku.motion.shape_mapping import find_head, map_by_shape
 from bunraku.motion.skeleton import (
     JOINT_COUNT,
     JOINTS,
-    PARENTS,
     Figure,
     Motion,
     joint_and_tip_positions,
@@ -52,6 +51,28 @@ class Analysis:
     max_fit_error_mm: float
 
 
+@dataclass(frozen=True, slots=True)
+class SourceFit:
+    """Fit of a figure to a source: the state of the fit, and the rest pose and naming convention that led to it.
+
+    `lowered` is the height in metres that was subtracted from all positions, because the source was off the floor.
+    """
+
+    fit: FigureFit
+    rest: RestPose
+    profile: str
+    lowered: float
+    assumptions: list[str]
+
+    def build_figure(self) -> Figure:
+        """Return the figure; in its rest pose the lowest point is on the floor."""
+        still = np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
+        offsets = self.fit.offsets.copy()
+        offsets[0] = 0.0
+        offsets[0, 1] = -joint_and_tip_positions(Figure(offsets, self.fit.tips), np.zeros(3), still)[:, 1].min()
+        return Figure(offsets, self.fit.tips)
+
+
 def analyse(bvh: Bvh) -> Analysis:
     """Fit the 19 channels and a figure with the source's limb lengths to `bvh`.
 
@@ -59,6 +80,26 @@ def analyse(bvh: Bvh) -> Analysis:
     straight below the previous joint, so that an elbow bends about -x and a knee about x. Raises `UnreadableMotion` if
     the skeleton is not humanoid.
     """
+    source = fit_source(bvh)
+    fit = source.fit
+    motion = Motion(source.build_figure(), bvh.fps, fit.joint_positions[:, 0].copy(), fit.local_rotations())
+    placed, _ = world_transforms(motion.figure, motion.root, motion.rotations)
+    mapped = sorted(fit.joints)
+    apart = 1000.0 * np.linalg.norm(placed[:, mapped] - fit.position[:, [fit.joints[j] for j in mapped]], axis=-1)
+    return Analysis(
+        motion=motion,
+        profile=source.profile,
+        source_joints={JOINTS[joint]: bvh.names[fit.joints[joint]] for joint in mapped},
+        rest_pose=source.rest.pose,
+        unit=source.rest.unit,
+        assumptions=source.assumptions,
+        mean_fit_error_mm=float(apart.mean()),
+        max_fit_error_mm=float(apart.max()),
+    )
+
+
+def fit_source(bvh: Bvh) -> SourceFit:
+    """Fit a figure and the rules of its joints to all frames of `bvh`; raise `UnreadableMotion` as `analyse` does."""
     naming = map_by_name(bvh.names, bvh.parents) or map_by_shape(bvh)
     guessed = [*bvh.notes, *naming.assumptions]
     frames = sample_frames(bvh)
@@ -72,25 +113,12 @@ def analyse(bvh: Bvh) -> Analysis:
     if _starts_with_calibration_pose(fit):
         guessed.append("The first frame is a pose apart from the dance; it was left out.")
         fit = fit.without_first_frame()
-    _move_to_floor(fit, guessed)
+    lowered = _move_to_floor(fit, guessed)
     fit_trunk(fit)
     for side in "lr":
         fit_leg(fit, side)
         fit_arm(fit, side)
-    motion = _build_motion(fit, bvh.fps)
-    placed, _ = world_transforms(motion.figure, motion.root, motion.rotations)
-    mapped = sorted(fit.joints)
-    apart = 1000.0 * np.linalg.norm(placed[:, mapped] - fit.position[:, [fit.joints[j] for j in mapped]], axis=-1)
-    return Analysis(
-        motion=motion,
-        profile=naming.profile,
-        source_joints={JOINTS[joint]: bvh.names[fit.joints[joint]] for joint in mapped},
-        rest_pose=rest.pose,
-        unit=rest.unit,
-        assumptions=guessed,
-        mean_fit_error_mm=float(apart.mean()),
-        max_fit_error_mm=float(apart.max()),
-    )
+    return SourceFit(fit, rest, naming.profile, lowered, guessed)
 
 
 def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:
@@ -126,23 +154,12 @@ def _starts_with_calibration_pose(fit: FigureFit) -> bool:
     return bool(step[0] > CALIBRATION_POSE_LIMITS[0] and step[0] > CALIBRATION_POSE_LIMITS[1] * step[1:].max())
 
 
-def _move_to_floor(fit: FigureFit, assumptions: list[str]) -> None:
+def _move_to_floor(fit: FigureFit, assumptions: list[str]) -> float:
+    """Lower the source if its feet are far from the floor; return by how much, in metres."""
     feet = [source for joint, source in fit.joints.items() if JOINTS[joint][2:] in ("ankle", "midtarsal")]
     lowest = float(fit.position[:, feet or list(fit.joints.values()), 1].min())
-    if abs(lowest) > FLOOR_TOLERANCE_M:
-        assumptions.append(
-            f"The lowest point of the feet was {lowest:.2f} m from the floor; the dance was moved onto it."
-        )
-        fit.position[..., 1] -= lowest
-
-
-def _build_motion(fit: FigureFit, fps: float) -> Motion:
-    """Return the figure's motion; in its rest pose the lowest point is on the floor."""
-    rotations = fit.joint_orientations.copy()
-    parents = fit.joint_orientations[:, PARENTS[1:]]
-    rotations[:, 1:] = rotation.multiply(rotation.conjugate(parents), fit.joint_orientations[:, 1:])
-    still = np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
-    offsets = fit.offsets.copy()
-    offsets[0] = 0.0
-    offsets[0, 1] = -joint_and_tip_positions(Figure(offsets, fit.tips), np.zeros(3), still)[:, 1].min()
-    return Motion(Figure(offsets, fit.tips), fps, fit.joint_positions[:, 0].copy(), rotation.normalise(rotations))
+    if abs(lowest) <= FLOOR_TOLERANCE_M:
+        return 0.0
+    assumptions.append(f"The lowest point of the feet was {lowest:.2f} m from the floor; the dance was moved onto it.")
+    fit.position[..., 1] -= lowest
+    return lowest

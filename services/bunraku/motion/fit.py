@@ -9,6 +9,7 @@ import numpy as np
 from bunraku.motion import procrustes, rotation
 from bunraku.motion.bvh import Bvh
 from bunraku.motion.bvh_kinematics import ancestor_chain, forward_kinematics
+from bunraku.motion.joint_rule import JointRule, aim_at
 from bunraku.motion.rest_pose import RestPose
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS
@@ -20,7 +21,8 @@ class FigureFit:
 
     `joints` maps H-Anim index to source index; `position` (n, J, 3) are the source's joints and `turn` (n, J, 4) their
     rotation from rest; `rest_positions` (J, 3) and `rest_orientations` (J, 4) describe the source at rest. Of the
-    figure: `offsets` and `tips` (18, 3), `joint_positions` (n, 18, 3) and `joint_orientations` (n, 18, 4) in the world.
+    figure: `offsets` and `tips` (18, 3), `rules` by H-Anim index, `joint_positions` (n, 18, 3) and `joint_orientations`
+    (n, 18, 4) in the world.
     """
 
     bvh: Bvh
@@ -32,11 +34,13 @@ class FigureFit:
     rest_orientations: Array
     offsets: Array = field(init=False)
     tips: Array = field(init=False)
+    rules: dict[int, JointRule] = field(init=False)
     joint_positions: Array = field(init=False)
     joint_orientations: Array = field(init=False)
 
     def __post_init__(self) -> None:
         n = len(self.position)
+        self.rules = {}
         self.offsets, self.tips = np.zeros((JOINT_COUNT, 3)), np.zeros((JOINT_COUNT, 3))
         self.joint_positions, self.joint_orientations = np.zeros((n, JOINT_COUNT, 3)), np.zeros((n, JOINT_COUNT, 4))
 
@@ -64,14 +68,39 @@ class FigureFit:
         """Return the fit without its first frame."""
         return replace(self, position=self.position[1:], turn=self.turn[1:])
 
-    def place_joint(self, joint: int, offset: Array, orientation: Array) -> None:
-        """Place a joint of the figure: `offset` (3,) in its parent, world `orientation` (n, 4)."""
+    def place_joint(self, joint: int, offset: Array, rule: JointRule) -> None:
+        """Place a joint of the figure: `offset` (3,) in its parent, orientation by `rule`. The root has no offset."""
         parent = PARENTS[joint]
-        self.offsets[joint] = offset
-        self.joint_positions[:, joint] = self.joint_positions[:, parent] + rotation.rotate(
-            self.joint_orientations[:, parent], offset
-        )
-        self.joint_orientations[:, joint] = orientation
+        if parent < 0:
+            self.joint_positions[:, joint] = self.position[:, self.joints[joint]]
+        else:
+            self.offsets[joint] = offset
+            self.joint_positions[:, joint] = self.joint_positions[:, parent] + rotation.rotate(
+                self.joint_orientations[:, parent], offset
+            )
+        self.rules[joint] = rule
+        self.joint_orientations[:, joint] = self._orient_joint(joint, rule)
+
+    def _orient_joint(self, joint: int, rule: JointRule) -> Array:
+        """Return the world orientation (n, 4) of a placed joint by its rule."""
+        if rule.nearest is not None:
+            targets = self.relative_positions(joint, list(rule.nearest.targets))
+            orientation = procrustes.solve_kabsch(rule.nearest.local_positions, targets, rule.nearest.weights)
+        elif rule.source is not None:
+            orientation = rotation.multiply(self.turn[:, rule.source], rule.rest)
+        else:
+            orientation = self.joint_orientations[:, rule.copied]
+        if rule.aim is None:
+            return orientation
+        start = self.joint_positions[:, joint] if rule.aim.start is None else self.position[:, rule.aim.start]
+        return aim_at(orientation, rule.aim.offset, start, self.position[:, rule.aim.target])
+
+    def local_rotations(self) -> Array:
+        """Return the rotations (n, 18, 4) of the placed joints in the frames of their parents."""
+        rotations = self.joint_orientations.copy()
+        parents = self.joint_orientations[:, PARENTS[1:]]
+        rotations[:, 1:] = rotation.multiply(rotation.conjugate(parents), self.joint_orientations[:, 1:])
+        return rotation.normalise(rotations)
 
     def relative_positions(self, joint: int, sources: list[int]) -> Array:
         """Return positions (n, m, 3) of `sources` relative to the figure's `joint`, in world axes."""

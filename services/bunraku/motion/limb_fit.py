@@ -6,6 +6,7 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.fit import FigureFit
+from bunraku.motion.joint_rule import Aim, JointRule
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, standard_figure
 
@@ -37,16 +38,6 @@ def rotation_to_hanging(bone: Array) -> Array:
     return rotation.multiply(rotation.from_coordinate_axis(0, np.arctan2(z, across)), lowered)
 
 
-def aim_at(orientation: Array, offset: Array, start: Array, target: Array) -> Array:
-    """Return `orientation` (n, 4) with the smallest rotation that aims `offset` (3,) from `start` (n, 3) at `target`
-    (n, 3)."""
-    there = target - start
-    turn = rotation.rotation_between(rotation.rotate(orientation, offset), there)
-    # a target at the joint itself has no direction
-    near = np.linalg.norm(there, axis=-1, keepdims=True) < 1e-6
-    return rotation.normalise(rotation.multiply(np.where(near, rotation.IDENTITY, turn), orientation))
-
-
 def fit_leg(fit: FigureFit, side: str) -> None:
     """Place hip, knee, ankle and midtarsal of `side` ("l" or "r") and the toe tip; the hip's offset is known."""
     hip, knee, ankle, midtarsal = (JOINT_INDEX[f"{side}_{name}"] for name in ("hip", "knee", "ankle", "midtarsal"))
@@ -55,11 +46,11 @@ def fit_leg(fit: FigureFit, side: str) -> None:
     if ankle in fit.joints:
         _fit_joint(fit, ankle, turn)
     else:
-        fit.place_joint(ankle, fit.offsets[ankle], fit.joint_orientations[:, knee])
+        fit.place_joint(ankle, fit.offsets[ankle], JointRule(copied=knee))
     if midtarsal in fit.joints:
         _fit_joint(fit, midtarsal, turn)
     else:
-        fit.place_joint(midtarsal, fit.offsets[midtarsal], fit.joint_orientations[:, ankle])
+        fit.place_joint(midtarsal, fit.offsets[midtarsal], JointRule(copied=ankle))
     fit.tips[midtarsal] = TOE_LENGTH_M * toes
 
 
@@ -74,7 +65,7 @@ def fit_arm(fit: FigureFit, side: str) -> None:
             length, turn = float(np.linalg.norm(hand)), rotation_to_hanging(hand)
         _fit_joint(fit, wrist, turn)
     else:
-        fit.place_joint(wrist, fit.offsets[wrist], fit.joint_orientations[:, elbow])
+        fit.place_joint(wrist, fit.offsets[wrist], JointRule(copied=elbow))
     fit.tips[wrist] = length * DOWN
 
 
@@ -100,11 +91,11 @@ def _fit_joint(fit: FigureFit, joint: int, turn: Array) -> None:
 
     `turn` (4,) rotates the source's rest pose to the figure's. The offsets of both joints are known.
     """
-    orientation = rotation.multiply(fit.turn[:, fit.joints[joint]], rotation.conjugate(turn))
-    fit.place_joint(joint, fit.offsets[joint], orientation)
-    if joint not in LIMB_END_JOINTS and (following := fit.joints.get(joint + 1)) is not None:
-        start, target = fit.joint_positions[:, joint], fit.position[:, following]
-        fit.joint_orientations[:, joint] = aim_at(orientation, fit.offsets[joint + 1], start, target)
+    following = None if joint in LIMB_END_JOINTS else fit.joints.get(joint + 1)
+    aim = None if following is None else Aim(fit.offsets[joint + 1].copy(), following)
+    fit.place_joint(
+        joint, fit.offsets[joint], JointRule(source=fit.joints[joint], rest=rotation.conjugate(turn), aim=aim)
+    )
 
 
 LIMB_END_JOINTS = tuple(JOINT_INDEX[f"{side}_{name}"] for side in "lr" for name in ("midtarsal", "wrist"))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from bunraku.motion import procrustes, rotation
 from bunraku.motion.bvh_kinematics import ancestor_chain
 from bunraku.motion.fit import FigureFit
-from bunraku.motion.limb_fit import aim_at
+from bunraku.motion.joint_rule import Aim, JointRule, NearestPoints
 from bunraku.motion.name_mapping import common_ancestor
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX
@@ -30,8 +30,7 @@ SHOULDERS = ("l_shoulder", "r_shoulder")
 
 def fit_trunk(fit: FigureFit) -> None:
     """Place root, sacroiliac, vl5 and skullbase, and set the offsets of hips and shoulders."""
-    root = fit.joints[0]
-    fit.joint_positions[:, 0], fit.joint_orientations[:, 0] = fit.position[:, root], fit.turn[:, root]
+    fit.place_joint(0, np.zeros(3), JointRule(source=fit.joints[0]))
     _fit_pelvis(fit)
     _fit_chest(fit)
     _fit_head(fit)
@@ -41,16 +40,14 @@ def _fit_pelvis(fit: FigureFit) -> None:
     """Place the sacroiliac at the source's pelvis or at the root; if the hips move in it, rotate it with their axis."""
     pelvis = JOINT_INDEX["sacroiliac"]
     source = fit.joints.get(pelvis)
-    if source is None:
-        fit.place_joint(pelvis, np.zeros(3), fit.joint_orientations[:, 0])
-    else:
-        fit.place_joint(pelvis, fit.mean_offset(0, source), fit.turn[:, source])
-    hips = fit.relative_positions(pelvis, [fit.joints[JOINT_INDEX[name]] for name in HIPS])
+    rule = JointRule(copied=0) if source is None else JointRule(source=source)
+    fit.place_joint(pelvis, np.zeros(3) if source is None else fit.mean_offset(0, source), rule)
+    sources = [fit.joints[JOINT_INDEX[name]] for name in HIPS]
+    hips = fit.relative_positions(pelvis, sources)
     places = procrustes.mean_local_positions(fit.joint_orientations[:, pelvis], hips)
     if procrustes.rms_error(fit.joint_orientations[:, pelvis], places, hips, np.ones(2)) > MIN_IMPROVEMENT_M:
-        fit.joint_orientations[:, pelvis] = aim_at(
-            fit.joint_orientations[:, pelvis], places[0] - places[1], hips[:, 1], hips[:, 0]
-        )
+        aim = Aim(places[0] - places[1], target=sources[0], start=sources[1])
+        fit.place_joint(pelvis, fit.offsets[pelvis].copy(), replace(rule, aim=aim))
         places = procrustes.mean_local_positions(fit.joint_orientations[:, pelvis], hips)
     for name, place in zip(HIPS, places, strict=True):
         fit.offsets[JOINT_INDEX[name]] = place
@@ -81,14 +78,13 @@ def _fit_chest(fit: FigureFit) -> None:
     chosen = _select_chest(fit, spine, sources, weights)
     if chosen.position_joint != root:
         fit.joints[vl5] = chosen.position_joint
-    fit.place_joint(
-        vl5,
-        fit.mean_offset(0, chosen.position_joint),
-        fit.turn[:, spine[-1] if chosen.orientation_joint is None else chosen.orientation_joint],
+    rule = (
+        JointRule(source=chosen.orientation_joint)
+        if chosen.orientation_joint is not None
+        else JointRule(nearest=NearestPoints(chosen.local_positions, tuple(sources), weights))
     )
+    fit.place_joint(vl5, fit.mean_offset(0, chosen.position_joint), rule)
     targets = fit.relative_positions(vl5, sources)
-    if chosen.orientation_joint is None:
-        fit.joint_orientations[:, vl5] = procrustes.solve_kabsch(chosen.local_positions, targets, weights)
     for joint, place in zip(
         carried, procrustes.mean_local_positions(fit.joint_orientations[:, vl5], targets), strict=True
     ):
@@ -124,7 +120,7 @@ def _fit_head(fit: FigureFit) -> None:
     source = fit.joints.get(head)
     if source is None:
         middle = fit.offsets[[JOINT_INDEX[name] for name in SHOULDERS]].mean(axis=0)
-        fit.place_joint(head, middle + np.array([0.0, NECK_LENGTH_M, 0.0]), fit.joint_orientations[:, vl5])
+        fit.place_joint(head, middle + np.array([0.0, NECK_LENGTH_M, 0.0]), JointRule(copied=vl5))
     else:
-        fit.place_joint(head, fit.offsets[head], fit.turn[:, source])
+        fit.place_joint(head, fit.offsets[head], JointRule(source=source))
     fit.tips[head] = (0.0, CROWN_OFFSET_M, 0.0)

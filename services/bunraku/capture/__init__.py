@@ -1,0 +1,1 @@
+"""Live motion capture: packets of capture tools to poses of the figure. Pure."""
