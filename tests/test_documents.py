@@ -22,7 +22,7 @@ DOCUMENTS = [
     *(ROOT / "proto").glob("*.md"),
 ]
 MAX_README_WORDS = 1200
-COMMAND_GROUPS = ("bench", "send")
+COMMAND_GROUPS = ("bench", "capture", "send")
 BUNRAKU = Path(sys.executable).parent / "bunraku"
 
 

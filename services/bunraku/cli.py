@@ -23,6 +23,7 @@ from bunraku.cli_access import (
     token,
 )
 from bunraku.cli_bench import bench
+from bunraku.cli_capture import capture
 from bunraku.cli_send import send
 from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
@@ -48,6 +49,7 @@ app = typer.Typer(
 app.command()(token)
 app.command()(share)
 app.add_typer(bench, name="bench")
+app.add_typer(capture, name="capture")
 app.add_typer(send, name="send")
 
 MotionArgument = Annotated[str, typer.Argument(help="Id or address of a motion.")]
