@@ -1,6 +1,6 @@
 /** Processes of browsers and displays. */
 import { type ChildProcess, spawn } from "node:child_process";
-import { existsSync } from "node:fs";
+import { existsSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
 import { delimiter, join } from "node:path";
 import { createInterface } from "node:readline";
@@ -37,12 +37,22 @@ export function findInOutput(started: ChildProcess, output: Readable, pattern: R
   });
 }
 
+/** Time after which a program that does not end is killed, in milliseconds. */
+const STOP_TIMEOUT_MS = 20_000;
+
 /** End a program. */
 export async function stopProcess(started: ChildProcess): Promise<void> {
   if (started.pid === undefined || started.exitCode !== null || started.signalCode !== null) return;
   const exited = new Promise((resolve) => started.once("exit", resolve));
   started.kill();
+  const timeout = setTimeout(() => started.kill("SIGKILL"), STOP_TIMEOUT_MS);
   await exited;
+  clearTimeout(timeout);
+}
+
+/** Remove the folder of a browser that has ended. Its last processes may still write while they end. */
+export function removeFolder(folder: string): void {
+  rmSync(folder, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
 }
 
 /** Return a TCP port that is free now. */

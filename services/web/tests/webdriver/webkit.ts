@@ -1,6 +1,6 @@
 /** WebKitGTK through its driver, by the HTTP protocol of W3C WebDriver. */
 import type { ChildProcess } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import {
@@ -14,7 +14,14 @@ import {
   WAIT_TIMEOUT_MS,
   type WindowSize,
 } from "./browser";
-import { findFreePort, startProcess, startVirtualDisplay, stopProcess, type VirtualDisplay } from "./processes";
+import {
+  findFreePort,
+  removeFolder,
+  startProcess,
+  startVirtualDisplay,
+  stopProcess,
+  type VirtualDisplay,
+} from "./processes";
 
 /** Key of a reference to an element (W3C WebDriver, 12.1). */
 const ELEMENT_KEY = "element-6066-11e4-a52e-4f735466cecf";
@@ -104,7 +111,7 @@ class WebKit implements Browser {
   async close(): Promise<void> {
     await stopProcess(this.driver);
     await this.display.stop();
-    rmSync(this.folder, { recursive: true, force: true });
+    removeFolder(this.folder);
   }
 }
 
