@@ -118,9 +118,9 @@ prior: .setup/python
 bench-audio: setup
 	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "clicks are heard in time"
 
-# test the page in Firefox and WebKitGTK: needs firefox-esr, webkit2gtk-driver and xvfb
+# test the page in Firefox and WebKitGTK, also what is too slow for `make test`: needs firefox-esr, webkit2gtk-driver, xvfb
 test-webdriver: setup
-	cd services/web && npx vitest run --project webdriver
+	cd services/web && npx vitest run --project webdriver --project webdriver-slow
 
 # take the pictures of README and docs from the running page
 pictures: setup

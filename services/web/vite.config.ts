@@ -57,10 +57,22 @@ export default defineConfig({
         test: {
           name: "webdriver",
           include: ["tests/webdriver/*.test.ts"],
+          exclude: ["tests/webdriver/*.slow.test.ts"],
           globalSetup: "tests/browser/global-setup.ts",
           // One browser at a time, because each renders in software on several processors.
           fileParallelism: false,
           sequence: { groupOrder: 2 },
+        },
+      },
+      {
+        extends: true,
+        test: {
+          // Cases for which a busy machine without a graphics processor has no time: `npm test` does not run them.
+          name: "webdriver-slow",
+          include: ["tests/webdriver/*.slow.test.ts"],
+          globalSetup: "tests/browser/global-setup.ts",
+          fileParallelism: false,
+          sequence: { groupOrder: 3 },
         },
       },
     ],

@@ -10,13 +10,21 @@ function createInvitation(stored: Record<string, string> = {}) {
     get: (key: string) => stored[key] ?? null,
     put: (key: string, text: string) => void (stored[key] = text),
   };
-  const invitation = new Invitation({ invite: (isInvited) => void shown.push(isInvited) }, storage);
-  return { invitation, shown, stored };
+  let onShown: (() => void) | null = null;
+  const tags = {
+    invite(callback: () => void) {
+      shown.push(true);
+      onShown = callback;
+    },
+    endInvitation: () => void shown.push(false),
+  };
+  return { invitation: new Invitation(tags, storage), shown, stored, place: () => onShown?.() };
 }
 
 test("invitation is shown for six seconds, once", () => {
-  const { invitation, shown, stored } = createInvitation();
+  const { invitation, shown, stored, place } = createInvitation();
   invitation.start();
+  place();
   vi.advanceTimersByTime(3_000);
   invitation.start();
   vi.advanceTimersByTime(2_999);
@@ -31,6 +39,18 @@ test("invitation is shown for six seconds, once", () => {
   expect(next.shown).toEqual([]);
 });
 
+test("duration of the invitation begins when it has a position", () => {
+  const { invitation, shown, place } = createInvitation();
+  invitation.start();
+  vi.advanceTimersByTime(60_000);
+  expect(shown).toEqual([true]);
+  place();
+  vi.advanceTimersByTime(5_999);
+  expect(shown).toEqual([true]);
+  vi.advanceTimersByTime(1);
+  expect(shown).toEqual([true, false]);
+});
+
 test("invitation ends when a limb is claimed, even before it was shown", () => {
   const { invitation, shown, stored } = createInvitation();
   invitation.finish();
@@ -42,8 +62,9 @@ test("invitation ends when a limb is claimed, even before it was shown", () => {
 });
 
 test("a limb that is claimed while the invitation is shown ends it at once", () => {
-  const { invitation, shown } = createInvitation();
+  const { invitation, shown, place } = createInvitation();
   invitation.start();
+  place();
   invitation.finish();
   vi.advanceTimersByTime(10_000);
   expect(shown).toEqual([true, false]);

@@ -2,13 +2,20 @@
  * Firefox through WebDriver BiDi (W3C Working Draft), which the browser itself serves: Debian has no geckodriver.
  */
 import type { ChildProcess } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import type { Readable } from "node:stream";
 import type { Browser, BrowserSession, BrowserWindow, SessionOptions, WindowSize } from "./browser";
 import { COMMAND_TIMEOUT_MS } from "./browser";
-import { findInOutput, startProcess, startVirtualDisplay, stopProcess, type VirtualDisplay } from "./processes";
+import {
+  findInOutput,
+  removeFolder,
+  startProcess,
+  startVirtualDisplay,
+  stopProcess,
+  type VirtualDisplay,
+} from "./processes";
 
 type Parameters = Record<string, unknown>;
 
@@ -81,6 +88,8 @@ const PREFERENCES = {
   // An audio device without hardware, or an AudioContext would never run.
   "media.cubeb.force_mock_context": true,
   "browser.download.folderList": 2,
+  // The list of downloads would take the focus of the page, and its keys.
+  "browser.download.alwaysOpenPanel": false,
   "ui.prefersReducedMotion": 1,
 };
 
@@ -187,7 +196,7 @@ class Firefox implements Browser {
     this.connection.close();
     await stopProcess(this.browser);
     await this.display.stop();
-    rmSync(this.folder, { recursive: true, force: true });
+    removeFolder(this.folder);
   }
 }
 

@@ -54,13 +54,6 @@ export function definePageCases(fixture: WebDriverFixture): void {
     }).toBe(count);
   }
 
-  /** Poll the share of the stage that differs from a screenshot. */
-  function expectChange(window: BrowserWindow, before: string) {
-    return poll("share of pixels that differ from an earlier screenshot", async () =>
-      compareScreenshots(window, before, await window.screenshot()),
-    );
-  }
-
   /** Drag a hand upwards and release it: it moves, and does not stay there. */
   async function pullHand(window: BrowserWindow, pointerType: PointerType, hand: Point): Promise<void> {
     const before = await window.screenshot();
@@ -101,12 +94,7 @@ export function definePageCases(fixture: WebDriverFixture): void {
   }
 
   test("the puppet is drawn, and pulled by mouse, touch, keys and gamepad", async () => {
-    const window = await open("?session=no-such-session");
-    await waitForAnnouncement(window, "The session has ended");
-    const empty = await window.screenshot();
-    await window.goto(`${fixture.url}/?session=${fixture.session}&name=Aiko`);
-    await waitForStart(window);
-    await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
+    const window = await openAndSeePuppet(fixture, "name=Aiko");
 
     // The invitation to take a hand, which covers the stage, ends with the first claim.
     const hand = await findHand(window);
@@ -294,11 +282,39 @@ export function definePageCases(fixture: WebDriverFixture): void {
   });
 }
 
+/**
+ * Cases that take seconds per frame without a graphics processor, and minutes on a busy machine. They are the project
+ * `webdriver-slow`, which only `make test-webdriver` runs.
+ */
+export function defineSlowCases(fixture: WebDriverFixture): void {
+  test("the puppet is drawn in the quality for graphics processors", async () => {
+    await openAndSeePuppet(fixture, "quality=best");
+  });
+}
+
 /** A small avatar file. */
 const AVATAR_BASE64 = Buffer.from(createFigureFile({ vrm: 1 })).toString("base64");
 
 function poll<T>(message: string, read: () => T | Promise<T>) {
   return expect.poll(read, { timeout: WAIT_TIMEOUT_MS, interval: POLL_INTERVAL_MS, message });
+}
+
+/** Poll the share of the stage that differs from a screenshot. */
+function expectChange(window: BrowserWindow, before: string) {
+  return poll("share of pixels that differ from an earlier screenshot", async () =>
+    compareScreenshots(window, before, await window.screenshot()),
+  );
+}
+
+/** Open the page of the test's session with more parameters, and wait until it shows more than an empty stage. */
+async function openAndSeePuppet({ open, url, session }: WebDriverFixture, parameters: string): Promise<BrowserWindow> {
+  const window = await open("?session=no-such-session");
+  await waitForAnnouncement(window, "The session has ended");
+  const empty = await window.screenshot();
+  await window.goto(`${url}/?session=${session}&${parameters}`);
+  await waitForStart(window);
+  await expectChange(window, empty).toBeGreaterThan(MIN_PUPPET_SHARE);
+  return window;
 }
 
 /** Return a page of another site with a stage. */

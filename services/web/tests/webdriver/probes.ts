@@ -97,15 +97,30 @@ function measureSound(): void {
   } as typeof AudioNode.prototype.connect;
 }
 
+/**
+ * In a page or worker: report the software driver that draws. WebKit reports "Apple GPU" for every driver, and the page
+ * then draws in the quality for graphics processors, which takes seconds per frame in software.
+ */
+function reportSoftwareDriver(): void {
+  const { WebGL2RenderingContext } = globalThis as Partial<typeof globalThis>;
+  if (!WebGL2RenderingContext) return;
+  const UNMASKED_RENDERER_WEBGL = 0x9246;
+  const { prototype } = WebGL2RenderingContext;
+  const getParameter = prototype.getParameter as (this: WebGL2RenderingContext, name: number) => unknown;
+  prototype.getParameter = function (name) {
+    return name === UNMASKED_RENDERER_WEBGL ? "llvmpipe" : getParameter.call(this, name);
+  };
+}
+
 const SLOW_DISPLAY = `(${slowDownDisplay})(${FRAME_INTERVAL_MS});`;
 
 /** Return the scripts of pages and workers. `removeFeatures` runs in both before everything else. */
 export function createProbes(removeFeatures: () => void): { page: string; worker: string } {
-  const remove = `(${removeFeatures})();`;
+  const everywhere = `(${removeFeatures})(); (${reportSoftwareDriver})(); ${SLOW_DISPLAY}`;
   return {
     page: `${[recordErrors, recordMessages, measureSound].map((probe) => `(${probe})();`).join("\n")}
-${remove} ${SLOW_DISPLAY}`,
+${everywhere}`,
     // Errors of a worker are reported by its page.
-    worker: `${remove} ${SLOW_DISPLAY}`,
+    worker: everywhere,
   };
 }

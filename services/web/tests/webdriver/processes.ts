@@ -1,6 +1,6 @@
 /** Processes of browsers and displays. */
 import { type ChildProcess, spawn } from "node:child_process";
-import { existsSync } from "node:fs";
+import { existsSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
 import { delimiter, join } from "node:path";
 import { createInterface } from "node:readline";
@@ -12,12 +12,42 @@ export function findProgram(name: string): string | null {
   return folders.map((folder) => join(folder, name)).find((path) => existsSync(path)) ?? null;
 }
 
-/** Start a program. Its descriptor 3 is a pipe. */
-export function startProcess(program: string, args: string[], env: NodeJS.ProcessEnv = {}): ChildProcess {
-  return spawn(program, args, {
+/** Start a program. Its descriptor 3 is a pipe. `isGroup`: the program and what it starts are a process group. */
+export function startProcess(
+  program: string,
+  args: string[],
+  env: NodeJS.ProcessEnv = {},
+  { isGroup = false } = {},
+): ChildProcess {
+  const started = spawn(program, args, {
     stdio: ["ignore", "pipe", "pipe", "pipe"],
     env: { ...process.env, ...env },
+    detached: isGroup,
   });
+  if (isGroup) {
+    const kill = () => signalGroup(started);
+    process.once("exit", kill);
+    started.once("exit", () => process.off("exit", kill));
+  }
+  return started;
+}
+
+function signalGroup({ pid }: ChildProcess): void {
+  if (pid === undefined) return;
+  try {
+    process.kill(-pid, "SIGKILL");
+  } catch (error) {
+    // All have ended.
+    if ((error as NodeJS.ErrnoException).code !== "ESRCH") throw error;
+  }
+}
+
+/** Kill a program and everything that it has started. */
+export async function killProcessGroup(started: ChildProcess): Promise<void> {
+  const hasExited = started.pid === undefined || started.exitCode !== null || started.signalCode !== null;
+  const exited = hasExited ? null : new Promise((resolve) => started.once("exit", resolve));
+  signalGroup(started);
+  await exited;
 }
 
 /** Return the first match of `pattern` in the lines of `output`. Rejects if the process ends before. */
@@ -37,12 +67,22 @@ export function findInOutput(started: ChildProcess, output: Readable, pattern: R
   });
 }
 
+/** Time after which a program that does not end is killed, in milliseconds. */
+const STOP_TIMEOUT_MS = 20_000;
+
 /** End a program. */
 export async function stopProcess(started: ChildProcess): Promise<void> {
   if (started.pid === undefined || started.exitCode !== null || started.signalCode !== null) return;
   const exited = new Promise((resolve) => started.once("exit", resolve));
   started.kill();
+  const timeout = setTimeout(() => started.kill("SIGKILL"), STOP_TIMEOUT_MS);
   await exited;
+  clearTimeout(timeout);
+}
+
+/** Remove the folder of a browser that has ended. Its last processes may still write while they end. */
+export function removeFolder(folder: string): void {
+  rmSync(folder, { recursive: true, force: true, maxRetries: 20, retryDelay: 100 });
 }
 
 /** Return a TCP port that is free now. */

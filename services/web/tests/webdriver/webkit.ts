@@ -1,6 +1,6 @@
 /** WebKitGTK through its driver, by the HTTP protocol of W3C WebDriver. */
 import type { ChildProcess } from "node:child_process";
-import { mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:fs";
+import { mkdirSync, mkdtempSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import {
@@ -11,20 +11,38 @@ import {
   type InputDevice,
   type PointerAction,
   type SessionOptions,
-  WAIT_TIMEOUT_MS,
   type WindowSize,
 } from "./browser";
-import { findFreePort, startProcess, startVirtualDisplay, stopProcess, type VirtualDisplay } from "./processes";
+import {
+  findFreePort,
+  killProcessGroup,
+  removeFolder,
+  startProcess,
+  startVirtualDisplay,
+  type VirtualDisplay,
+} from "./processes";
 
 /** Key of a reference to an element (W3C WebDriver, 12.1). */
 const ELEMENT_KEY = "element-6066-11e4-a52e-4f735466cecf";
 
+/**
+ * Time limit of the start of a browser, in milliseconds, and how often it is tried. The driver chooses a port that is free,
+ * and waits without end for the browser if another process takes the port before it does.
+ */
+const START_TIMEOUT_MS = 60_000;
+const START_ATTEMPTS = 3;
+
 /** Send a command and return the value of its response. */
-async function send<Value>(method: string, url: string, parameters: Record<string, unknown> = {}): Promise<Value> {
+async function send<Value>(
+  method: string,
+  url: string,
+  parameters: Record<string, unknown> = {},
+  timeoutMs = COMMAND_TIMEOUT_MS,
+): Promise<Value> {
   const response = await fetch(url, {
     method,
     body: method === "POST" ? JSON.stringify(parameters) : null,
-    signal: AbortSignal.timeout(COMMAND_TIMEOUT_MS),
+    signal: AbortSignal.timeout(timeoutMs),
   });
   const { value } = (await response.json()) as { value: Value & { error?: string; message?: string } };
   if (!response.ok) throw new Error(`${method} ${new URL(url).pathname}: ${value.error}: ${value.message}`);
@@ -38,21 +56,12 @@ export async function startWebKit(program: string): Promise<Browser> {
   writeFileSync(join(folder, ".config/user-dirs.dirs"), 'XDG_DOWNLOAD_DIR="$HOME/Downloads"\n');
   // The page prefers reduced motion.
   writeFileSync(join(folder, ".config/gtk-3.0/settings.ini"), "[Settings]\ngtk-enable-animations=0\n");
-  const display = await startVirtualDisplay();
-  const url = `http://127.0.0.1:${await findFreePort()}`;
-  const driver = startProcess(program, [`--port=${new URL(url).port}`], {
-    DISPLAY: display.name,
-    HOME: folder,
-    XDG_CONFIG_HOME: join(folder, ".config"),
-  });
-  for (const output of [driver.stdout, driver.stderr]) output?.resume();
-  await waitForDriver(driver, url);
-  return new WebKit(url, driver, display, folder, downloads);
+  return new WebKit(program, await startVirtualDisplay(), folder, downloads);
 }
 
 /** Wait until the driver accepts commands. */
 async function waitForDriver(driver: ChildProcess, url: string): Promise<void> {
-  const deadline = Date.now() + WAIT_TIMEOUT_MS;
+  const deadline = Date.now() + START_TIMEOUT_MS;
   while (driver.exitCode === null) {
     const isReady = await send("GET", `${url}/status`).then(
       () => true,
@@ -65,29 +74,57 @@ async function waitForDriver(driver: ChildProcess, url: string): Promise<void> {
   throw new Error(`WebKitWebDriver does not answer at ${url} (exit code ${driver.exitCode})`);
 }
 
-/** Each session is a browser of its own whose windows are private. */
+/** Each session has a driver and a browser of its own, whose windows are private. */
 class WebKit implements Browser {
   constructor(
-    private readonly url: string,
-    private readonly driver: ChildProcess,
+    private readonly program: string,
     private readonly display: VirtualDisplay,
     private readonly folder: string,
     private readonly downloads: string,
   ) {}
 
-  async openSession({ hasStorage = true }: SessionOptions = {}): Promise<BrowserSession> {
+  async openSession(options: SessionOptions = {}): Promise<BrowserSession> {
+    for (let attempt = 1; ; attempt++) {
+      const url = `http://127.0.0.1:${await findFreePort()}`;
+      const driver = this.#startDriver(url);
+      try {
+        await waitForDriver(driver, url);
+        return await this.#startBrowser(driver, url, options);
+      } catch (error) {
+        await killProcessGroup(driver);
+        if (attempt === START_ATTEMPTS) throw error;
+        console.warn(`WebKitGTK did not start, it is tried again: ${error}`);
+      }
+    }
+  }
+
+  #startDriver(url: string): ChildProcess {
+    const environment = {
+      DISPLAY: this.display.name,
+      HOME: this.folder,
+      XDG_CONFIG_HOME: join(this.folder, ".config"),
+    };
+    const driver = startProcess(this.program, [`--port=${new URL(url).port}`], environment, { isGroup: true });
+    for (const output of [driver.stdout, driver.stderr]) output?.resume();
+    return driver;
+  }
+
+  async #startBrowser(driver: ChildProcess, driverUrl: string, { hasStorage = true }: SessionOptions) {
     const storage = ["--enable-html5-local-storage=false", "--enable-html5-database=false"];
     const args = ["--automation", ...(hasStorage ? [] : storage)];
-    const { sessionId } = await send<{ sessionId: string }>("POST", `${this.url}/session`, {
-      capabilities: { alwaysMatch: { "webkitgtk:browserOptions": { args } } },
-    });
-    const url = `${this.url}/session/${sessionId}`;
+    const { sessionId } = await send<{ sessionId: string }>(
+      "POST",
+      `${driverUrl}/session`,
+      { capabilities: { alwaysMatch: { "webkitgtk:browserOptions": { args } } } },
+      START_TIMEOUT_MS,
+    );
+    const url = `${driverUrl}/session/${sessionId}`;
     await send("POST", `${url}/timeouts`, { script: COMMAND_TIMEOUT_MS, pageLoad: COMMAND_TIMEOUT_MS });
     let isFirst = true;
     return {
       errors: [],
       downloads: this.downloads,
-      async open(address, size) {
+      async open(address: string, size?: WindowSize) {
         const handle = isFirst
           ? await send<string>("GET", `${url}/window`)
           : (await send<{ handle: string }>("POST", `${url}/window/new`, { type: "window" })).handle;
@@ -97,14 +134,13 @@ class WebKit implements Browser {
         await window.goto(address);
         return window;
       },
-      close: () => send("DELETE", url),
+      close: () => killProcessGroup(driver),
     };
   }
 
   async close(): Promise<void> {
-    await stopProcess(this.driver);
     await this.display.stop();
-    rmSync(this.folder, { recursive: true, force: true });
+    removeFolder(this.folder);
   }
 }
 

@@ -14,8 +14,10 @@ export interface NameTags {
   setLimbs(limbs: readonly LimbState[]): void;
   /** Set the boxes of other elements that cover the picture, in CSS pixels. */
   setObstacles(obstacles: readonly ScreenBox[]): void;
-  /** Show the invitation once it has a position, or hide it. */
-  invite(isInvited: boolean): void;
+  /** Show the invitation once it has a position, and then call `onShown`. */
+  invite(onShown: () => void): void;
+  /** Hide the invitation. */
+  endInvitation(): void;
   /** Move the labels to the positions that a `LabelLayout` has found for their metrics. */
   place(positions: LabelPositions): void;
 }
@@ -50,6 +52,7 @@ export function createNameTags(
   let obstacles: readonly ScreenBox[] = [];
   let invitationSize: Size | null = null;
   let invitationPosition: LabelPosition | null = null;
+  let onInvitationShown: (() => void) | null = null;
   const publish = () =>
     onMeasure({ tags: tags.map(({ sizes }) => sizes), invitation: invitationSize, viewport, obstacles });
   const measureInvitation = (isInvited: boolean) => {
@@ -78,14 +81,23 @@ export function createNameTags(
       obstacles = boxes;
       publish();
     },
-    invite(isInvited) {
-      measureInvitation(isInvited);
+    invite(onShown) {
+      onInvitationShown = onShown;
+      measureInvitation(true);
+      publish();
+    },
+    endInvitation() {
+      onInvitationShown = null;
+      measureInvitation(false);
       publish();
     },
     place(positions) {
       for (const tag of tags) tag.place(positions.tags[tag.limb] ?? null);
       invitationPosition = positions.invitation;
       moveTo(invitation, invitationSize && invitationPosition);
+      if (!invitationSize || !invitationPosition) return;
+      onInvitationShown?.();
+      onInvitationShown = null;
     },
   };
 }
