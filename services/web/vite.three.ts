@@ -6,8 +6,7 @@ const SHADER = /\/\* glsl \*\/\s*`([^`$]*)`/g;
 
 /**
  * Imports the modules of three.js instead of its prebuilt file, of which a build cannot leave parts to later chunks:
- * what only avatars need, such as animation and loaders, loads with them. Comments of the shaders are removed, as in
- * the prebuilt file.
+ * what only avatars need, such as animation and loaders, loads with them. The shaders are minified.
  */
 export const threeModules: Plugin = {
   name: "three-modules",
@@ -15,14 +14,22 @@ export const threeModules: Plugin = {
   config: () => ({ resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] } }),
   transform: {
     filter: { id: /\/three\/src\/.*\.glsl\.js$/ },
-    handler: (code) => code.replace(SHADER, (_, shader: string) => `\`${removeComments(shader)}\``),
+    handler: (code) => code.replace(SHADER, (_, shader: string) => `\`${minifyShader(shader)}\``),
   },
 };
 
-/** Remove comments, indentation and empty lines of a shader. */
-function removeComments(shader: string): string {
+/** Remove what a shader does not need: comments, indentation, empty lines, and spaces around operators. */
+export function minifyShader(shader: string): string {
   return shader
     .replace(/\/\/.*/g, "")
     .replace(/\/\*.*?\*\//gs, "")
-    .replace(/\s*\n\s*/g, "\n");
+    .trim()
+    .split(/\s*\n\s*/)
+    .map((line) => (line.startsWith("#") ? line : removeSpaces(line)))
+    .join("\n");
+}
+
+/** Remove the spaces of a line of code that separate no words and no signs. */
+function removeSpaces(line: string): string {
+  return line.replace(/(?<=[\w)\].]) ([-+]) (?=[\w(.])/g, "$1").replace(/\s*([*/%=<>!&|^?:;,(){}[\]])\s*/g, "$1");
 }
