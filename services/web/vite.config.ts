@@ -1,5 +1,6 @@
 import { defineConfig } from "vitest/config";
 import { preloadScripts, startupChunks } from "./vite.chunks.ts";
+import { reducedRenderer } from "./vite.renderer.ts";
 import { avatarShaders } from "./vite.shaders.ts";
 import { threeModules } from "./vite.three.ts";
 
@@ -7,7 +8,7 @@ import { threeModules } from "./vite.three.ts";
 const TEST_TIMEOUT_MS = 120_000;
 
 export default defineConfig({
-  plugins: [threeModules, avatarShaders, preloadScripts],
+  plugins: [threeModules, avatarShaders, reducedRenderer, preloadScripts],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,
