@@ -86,7 +86,7 @@ export function splitChunks(): Record<string, SplitChunk> {
     for (const [, other] of SHADER_CHUNKS[name].matchAll(/#include +<(\w+)>/g)) included.add(other);
   return Object.fromEntries(
     Object.entries(SHADER_CHUNKS).map(([name, source]) => {
-      const chunk = minifyShader(source);
+      const chunk = minifyShader(source).trim();
       return [name, included.has(name) ? splitChunk(chunk) : { kept: PLACEHOLDER, removed: [chunk] }];
     }),
   );

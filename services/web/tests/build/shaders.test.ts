@@ -4,7 +4,7 @@ import { join, resolve } from "node:path";
 import { ShaderChunk } from "three/src/renderers/shaders/ShaderChunk.js";
 import { expect, test } from "vitest";
 import { type SplitChunk, splitChunk, splitChunks } from "../../vite.shaders.ts";
-import { minifyShader } from "../../vite.three.ts";
+import { minifyShader, minifyShaders } from "../../vite.three.ts";
 
 const STAGE = resolve(import.meta.dirname, "../../src/stage");
 
@@ -26,10 +26,17 @@ function tokens(shader: string): string[] {
 
 test("minified shaders have the tokens of their sources", () => {
   expect(minifyShader("// a\nx = - - y + ( - .5 ) * a [ 0 ]; /* b\n */\n\n\treturn -1.;")).toBe(
-    "x=- - y+(- .5)*a[0];\nreturn -1.;",
+    "\nx=- - y+(- .5)*a[0];\nreturn -1.;",
   );
   for (const [name, chunk] of Object.entries(ShaderChunk))
     expect(tokens(minifyShader(chunk)), name).toEqual(tokens(chunk));
+});
+
+test("shaders in modules are minified around their expressions", () => {
+  const code = "a = /* glsl */ `\n  // x\n  float ${ name } = ${a + b} + 1.;\n${CHUNK}\n`; b = `c  = d`;";
+  expect(minifyShaders(code)).toBe("a = `\nfloat ${ name }=${a + b}+1.;\n${CHUNK}\n`; b = `c  = d`;");
+  const nested = "/* glsl */ `a  = ${b ? `c` : ``};`";
+  expect(minifyShaders(nested)).toBe(nested);
 });
 
 test("code of avatars is removed with the conditions in it", () => {
@@ -78,7 +85,7 @@ test("the stage's shaders and the removed code are those of three.js", () => {
   const chunks = splitChunks();
   expect(Object.keys(chunks)).toEqual(Object.keys(ShaderChunk));
   for (const [name, chunk] of Object.entries(ShaderChunk))
-    expect(restore(chunks[name]), name).toBe(minifyShader(chunk));
+    expect(restore(chunks[name]), name).toBe(minifyShader(chunk).trim());
 });
 
 test("chunks that the stage's own shaders include are not removed", () => {
