@@ -1,10 +1,10 @@
 /** three.js's renderer without features that the page never uses. */
 import type { Plugin } from "vite";
 
-/** Code of the modules without their features, by path in the folder of the renderers. */
+/** Code of the modules without their features, by path in the folder of the sources. */
 export const REPLACED_MODULES: Readonly<Record<string, string>> = {
   // The page presents no immersive session, so `isPresenting` never becomes true.
-  "webxr/WebXRManager.js": `
+  "renderers/webxr/WebXRManager.js": `
     export class WebXRManager {
       enabled = false;
       isPresenting = false;
@@ -14,13 +14,15 @@ export const REPLACED_MODULES: Readonly<Record<string, string>> = {
       getEnvironmentBlendMode() {}
       dispose() {}
     }`,
+  // Only the cameras of such a session are arrays.
+  "math/FrustumArray.js": "export class FrustumArray {}",
   // No material has groups of uniforms.
-  "webgl/WebGLUniformsGroups.js": "export function WebGLUniformsGroups() { this.dispose = () => {}; }",
+  "renderers/webgl/WebGLUniformsGroups.js": "export function WebGLUniformsGroups() { this.dispose = () => {}; }",
   // The canvas has 8 bits per channel, so the renderer creates no output pass.
-  "webgl/WebGLOutput.js": "export class WebGLOutput {}",
+  "renderers/webgl/WebGLOutput.js": "export class WebGLOutput {}",
 };
 
-const MODULE = /\/three\/src\/renderers\/(web(?:gl|xr)\/\w+\.js)$/;
+const MODULE = /\/three\/src\/((?:math|renderers\/web(?:gl|xr))\/\w+\.js)$/;
 
 /** Replaces `REPLACED_MODULES`. */
 export const reducedRenderer: Plugin = {
