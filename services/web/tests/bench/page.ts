@@ -57,9 +57,9 @@ const CASES: Readonly<Record<string, (bench: BenchContext) => Promise<BenchFigur
 /** Upper bounds of the figures. */
 const BOUNDS: Readonly<Record<string, number>> = {
   first_paint_s: 1,
-  js_gzip_kb: 260,
+  js_gzip_kb: 236,
   fonts_kb: 60,
-  first_paint_1mbit_s: 3.5,
+  first_paint_1mbit_s: 3,
   main_ms_p95: 4,
   worker_ms_p95: 12,
   draw_calls: 12,
