@@ -59,7 +59,7 @@ const BOUNDS: Readonly<Record<string, number>> = {
   first_paint_s: 1,
   js_gzip_kb: 236,
   fonts_kb: 60,
-  first_paint_1mbit_s: 3,
+  first_paint_1mbit_s: 3.5,
   main_ms_p95: 4,
   worker_ms_p95: 12,
   draw_calls: 12,

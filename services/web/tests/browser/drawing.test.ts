@@ -7,6 +7,7 @@ import {
   pauseAtStart,
   readPrograms,
   ringPosition,
+  tapKey,
   waitForDraw,
   waitForFirstPose,
   waitForHold,
@@ -50,7 +51,7 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
   test("all shaders of the best quality are valid without the code that only avatars need", async () => {
     const page = await open("?quality=best", { colorScheme: "dark" });
     await waitForFirstPose(page);
-    await page.keyboard.press("Digit2");
+    await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
     await waitInEngine(page, () => globalThis.bunraku.stage.scene.getObjectByName("floor") !== undefined);
     await waitForDraw(page);
