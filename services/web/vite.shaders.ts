@@ -4,7 +4,7 @@ import { ShaderLib } from "three/src/renderers/shaders/ShaderLib.js";
 import type { Plugin } from "vite";
 import { minifyShader } from "./vite.three.ts";
 
-/** Shaders that the stage uses: of its materials and shadows, and what three.js adds to every shader. */
+/** Shaders that the stage uses: of its materials, shadows and environment, and what three.js adds to every shader. */
 const STAGE_CHUNKS = [
   "meshphysical_vert",
   "meshphysical_frag",
@@ -12,6 +12,7 @@ const STAGE_CHUNKS = [
   "meshbasic_frag",
   "depth_vert",
   "depth_frag",
+  "cube_vert",
   "tonemapping_pars_fragment",
   "colorspace_pars_fragment",
 ];

@@ -49,7 +49,13 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
   });
 
   test("all shaders of the best quality are valid without the code that only avatars need", async () => {
-    const page = await open("?quality=best", { colorScheme: "dark" });
+    // three.js reports shader errors on the console, also those of programs that it has deleted since.
+    const consoleErrors: string[] = [];
+    const page = await open("?quality=best", {
+      colorScheme: "dark",
+      before: async (page) =>
+        void page.on("console", (message) => message.type() === "error" && consoleErrors.push(message.text())),
+    });
     await waitForFirstPose(page);
     await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
@@ -59,6 +65,7 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
     for (const key of [/,figure$/, /,figure-mirrored$/, /^depth,/])
       expect(programs.some((program) => key.test(program.key))).toBe(true);
     expect(programs.filter(({ isValid }) => !isValid)).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
   test("the page is told of a state once the canvas shows it", async () => {

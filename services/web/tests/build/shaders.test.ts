@@ -7,6 +7,7 @@ import { type SplitChunk, splitChunk, splitChunks } from "../../vite.shaders.ts"
 import { minifyShader, minifyShaders } from "../../vite.three.ts";
 
 const STAGE = resolve(import.meta.dirname, "../../src/stage");
+const THREE = resolve(import.meta.dirname, "../../node_modules/three/src");
 
 /** Put the removed code back. */
 function restore({ kept, removed }: SplitChunk): string {
@@ -88,11 +89,22 @@ test("the stage's shaders and the removed code are those of three.js", () => {
     expect(restore(chunks[name]), name).toBe(minifyShader(chunk).trim());
 });
 
-test("chunks that the stage's own shaders include are not removed", () => {
+/** Read all modules in a folder. */
+function readModules(folder: string): string {
+  return readdirSync(folder, { recursive: true, encoding: "utf8" })
+    .filter((file) => /\.[jt]s$/.test(file))
+    .map((file) => readFileSync(join(folder, file), "utf8"))
+    .join("\n");
+}
+
+test("chunks that the stage and the modules of three.js name are not removed", () => {
   const chunks = splitChunks();
-  const included = readdirSync(STAGE, { recursive: true, encoding: "utf8" })
-    .filter((file) => file.endsWith(".ts"))
-    .flatMap((file) => [...readFileSync(join(STAGE, file), "utf8").matchAll(/#include <(\w+)>/g)]);
-  expect(included.length).toBeGreaterThan(0);
-  for (const [, name] of included) expect(chunks[name].kept, name).not.toBe("#error");
+  const code = [STAGE, join(THREE, "extras"), join(THREE, "materials"), join(THREE, "renderers/webgl")].map(
+    readModules,
+  );
+  const named = code.flatMap((text) => [...text.matchAll(/#include <(\w+)>|\bShaderChunk(?:\.|\[ ')(\w+)/g)]);
+  // Examples in comments name other chunks.
+  const names = new Set(named.map(([, included, member]) => included ?? member).filter((name) => name in chunks));
+  expect([...names]).toEqual(expect.arrayContaining(["opaque_fragment", "cube_vert", "tonemapping_pars_fragment"]));
+  for (const name of names) expect(chunks[name].kept, name).not.toBe("#error");
 });
