@@ -17,6 +17,7 @@ const STAGE = "src/engine/stage-chunk.ts";
 export const startupChunks: Rolldown.CodeSplittingGroup[] = [
   { name: "main", test: endsWith(MAIN), priority: 4 },
   { name: nameShared, debugName: "shared", priority: 3 },
+  { name: "start", test: endsWith(`/${PAGE}`), priority: 2 },
   { name: "engine", test: endsWith(ENGINE), priority: 2 },
   { name: "stage-chunk", test: endsWith(STAGE), priority: 1 },
 ];

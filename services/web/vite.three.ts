@@ -1,28 +1,47 @@
 /** Build of three.js from its modules. */
 import type { Plugin } from "vite";
 
-/** Template literal with a shader. */
-const SHADER = /\/\* glsl \*\/\s*`([^`$]*)`/g;
+/** Template literal with a shader. Its expressions contain no templates. */
+const SHADER = /\/\* glsl \*\/\s*`((?:[^`$]|\$(?!\{)|\$\{[^`{}]*\})*)`/g;
+const EXPRESSION = /\$\{[^}]*\}/g;
 
 /**
  * Imports the modules of three.js instead of its prebuilt file, of which a build cannot leave parts to later chunks:
- * what only avatars need, such as animation and loaders, loads with them. Comments of the shaders are removed, as in
- * the prebuilt file.
+ * what only avatars need, such as animation and loaders, loads with them. Its shaders and those of the stage are
+ * minified.
  */
 export const threeModules: Plugin = {
   name: "three-modules",
   apply: "build",
+  // Before comments are removed.
+  enforce: "pre",
   config: () => ({ resolve: { alias: [{ find: /^three$/, replacement: "three/src/Three.js" }] } }),
   transform: {
-    filter: { id: /\/three\/src\/.*\.glsl\.js$/ },
-    handler: (code) => code.replace(SHADER, (_, shader: string) => `\`${removeComments(shader)}\``),
+    filter: { id: /\/three\/src\/.*\.js$|\/src\/stage\/.*\.ts$/, code: "/* glsl */" },
+    handler: minifyShaders,
   },
 };
 
-/** Remove comments, indentation and empty lines of a shader. */
-function removeComments(shader: string): string {
+/** Minify the shaders in the code of a module. */
+export function minifyShaders(code: string): string {
+  return code.replace(SHADER, (_, shader: string) => {
+    const expressions: string[] = [];
+    const template = shader.replace(EXPRESSION, (expression) => `EXPRESSION_${expressions.push(expression) - 1}_`);
+    return `\`${minifyShader(template).replace(/EXPRESSION_(\d+)_/g, (_, index) => expressions[Number(index)])}\``;
+  });
+}
+
+/** Remove what a shader does not need: comments, indentation, empty lines, and spaces around operators. */
+export function minifyShader(shader: string): string {
   return shader
     .replace(/\/\/.*/g, "")
     .replace(/\/\*.*?\*\//gs, "")
-    .replace(/\s*\n\s*/g, "\n");
+    .split(/\s*\n\s*/)
+    .map((line) => (line.startsWith("#") ? line : removeSpaces(line)))
+    .join("\n");
+}
+
+/** Remove the spaces of a line of code that separate no words and no signs. */
+function removeSpaces(line: string): string {
+  return line.replace(/(?<=[\w)\].]) ([-+]) (?=[\w(.])/g, "$1").replace(/\s*([*/%=<>!&|^?:;,(){}[\]])\s*/g, "$1");
 }

@@ -287,6 +287,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   Close: "閉じる",
   "The key settings could not be loaded. Check your connection, then try again":
     "キーの設定を読み込めませんでした。接続を確かめて、もう一度お試しください",
+  "The connection panel could not be loaded. Check your connection, then try again":
+    "回線パネルを読み込めませんでした。接続を確かめて、もう一度お試しください",
   "Reset to defaults": "初期設定に戻す",
   "{pad} is connected": "{pad}を接続しました",
   "Press any button of a gamepad to connect it": "ゲームパッドのボタンを押すと接続します",

@@ -87,7 +87,11 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     close: () => panels.close("strings"),
     keys: () => mappingDialog.show(),
   });
-  const link = createLinkPanel(root, () => panels.close("line"));
+  const link = createLinkPanel(
+    root,
+    () => panels.close("line"),
+    () => toast(translate("The connection panel could not be loaded. Check your connection, then try again")),
+  );
   const transport = createTransport(root, { ...actions, panel: (name) => panels.toggle(name) });
   const elements = new Map<PanelName, HTMLElement>([
     ["library", library.panel.element],
@@ -98,6 +102,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     elements,
     (name, open) => {
       transport.setExpanded(name, open);
+      if (name === "line" && open) link.load();
       strings.dock.hidden = panels.isOpen("strings") || panels.isSheetOpen;
       occupied.invalidate();
       actions.reframe();

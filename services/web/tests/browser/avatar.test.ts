@@ -12,6 +12,7 @@ import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
   LEFT_HAND,
   pauseAtStart,
+  readPrograms,
   ringPosition,
   waitForDraw,
   waitForFirstPose,
@@ -33,6 +34,7 @@ const MIXAMO_FIGURE: FigureOptions = {
   arms: 40,
   forearm: 0.8,
   legLength: 0.85,
+  dressed: true,
 };
 
 describeInBrowser("avatars", { server: "open" }, ({ open }) => {
@@ -56,6 +58,7 @@ describeInBrowser("avatars", { server: "open" }, ({ open }) => {
     await waitForFirstPose(page);
     await waitInEngine(page, () => globalThis.bunraku.stage.puppet?.group.getObjectByName("figure") === undefined);
     expect(await limbAngleError(page)).toBeLessThan(1);
+    expect((await readPrograms(page)).filter(({ isValid }) => !isValid)).toEqual([]);
     await page.keyboard.press("Escape");
 
     await dragHand(page, LEFT_HAND);

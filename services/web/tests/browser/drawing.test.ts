@@ -2,7 +2,16 @@
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
 import { evaluateInEngine, waitInEngine } from "./engine-probe";
-import { LEFT_HAND, pauseAtStart, ringPosition, waitForFirstPose } from "./page-probe";
+import {
+  LEFT_HAND,
+  pauseAtStart,
+  readPrograms,
+  ringPosition,
+  tapKey,
+  waitForDraw,
+  waitForFirstPose,
+  waitForHold,
+} from "./page-probe";
 
 /** Callbacks without a frame after which a stage counts as still. */
 const STILL_CALLBACKS = 15;
@@ -37,6 +46,26 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
     const ring = await ringPosition(page, LEFT_HAND);
     await page.mouse.move(ring.x, ring.y);
     await waitInEngine(page, (frame) => globalThis.bunraku.stage.renderer.info.render.frame > frame, frame);
+  });
+
+  test("all shaders of the best quality are valid without the code that only avatars need", async () => {
+    // three.js reports shader errors on the console, also those of programs that it has deleted since.
+    const consoleErrors: string[] = [];
+    const page = await open("?quality=best", {
+      colorScheme: "dark",
+      before: async (page) =>
+        void page.on("console", (message) => message.type() === "error" && consoleErrors.push(message.text())),
+    });
+    await waitForFirstPose(page);
+    await tapKey(page, "Digit2");
+    await waitForHold(page, LEFT_HAND);
+    await waitInEngine(page, () => globalThis.bunraku.stage.scene.getObjectByName("floor") !== undefined);
+    await waitForDraw(page);
+    const programs = await readPrograms(page);
+    for (const key of [/,figure$/, /,figure-mirrored$/, /^depth,/])
+      expect(programs.some((program) => key.test(program.key))).toBe(true);
+    expect(programs.filter(({ isValid }) => !isValid)).toEqual([]);
+    expect(consoleErrors).toEqual([]);
   });
 
   test("the page is told of a state once the canvas shows it", async () => {

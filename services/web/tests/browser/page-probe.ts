@@ -125,6 +125,18 @@ export async function waitForPerformers(page: Page, count: number): Promise<void
   );
 }
 
+/** Return the shader programs of the stage, and whether each is valid. */
+export function readPrograms(page: Page): Promise<{ key: string; isValid: boolean }[]> {
+  return evaluateInEngine(page, () => {
+    const { renderer } = globalThis.bunraku.stage;
+    const gl = renderer.getContext();
+    return (renderer.info.programs ?? []).map(({ cacheKey, program }) => ({
+      key: cacheKey,
+      isValid: gl.getProgramParameter(program as WebGLProgram, gl.LINK_STATUS) as boolean,
+    }));
+  });
+}
+
 /** Wait until the page and its engine have drawn their present state, and the page that of its engine. */
 export async function waitForDraw(page: Page): Promise<void> {
   await waitForFrames(page);

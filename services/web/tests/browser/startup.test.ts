@@ -1,4 +1,5 @@
 /** Start of the page: what loads before it can be used, and what after. */
+import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { describeInBrowser } from "./browser-suite";
@@ -8,7 +9,12 @@ import { waitForFirstPose } from "./page-probe";
 /** Files that are loaded after the first frame. */
 const DEFERRED_FILES = [/inter-.*\.woff2/, /marionette-/, /sound-/, /-decoder-/];
 
-describeInBrowser("startup", { server: "open" }, ({ open }) => {
+/** Limit of the scripts before the first frame. Each 10 kB delay it by 80 ms on a connection of 1 Mbit/s. */
+const MAX_INITIAL_GZIP_BYTES = 224_000;
+
+describeInBrowser("startup", { server: "open" }, (fixture) => {
+  const { open } = fixture;
+
   test("the page can be used before the stage loads, and the rest follows", async () => {
     const requests: string[] = [];
     let initialRequests: Promise<string[]> | undefined;
@@ -62,6 +68,13 @@ describeInBrowser("startup", { server: "open" }, ({ open }) => {
     const initial = [...scripts].filter((path) => !DEFERRED_FILES.some((pattern) => pattern.test(path)));
     expect(initial.sort()).toEqual(linked.sort());
     expect(linked.length).toBeLessThanOrEqual(6);
+    const sizes = await Promise.all(
+      initial.map(async (path) => {
+        const response = await fetch(new URL(path, fixture.url));
+        return gzipSync(await response.arrayBuffer(), { level: 9 }).length;
+      }),
+    );
+    expect(sizes.reduce((sum, size) => sum + size)).toBeLessThanOrEqual(MAX_INITIAL_GZIP_BYTES);
   });
 
   test("the page works and shows a notice if the stage fails to load", async () => {

@@ -1,5 +1,5 @@
 /** Projection between world positions and a picture of the scene in CSS pixels. */
-import { type PerspectiveCamera, Plane, Raycaster, Vector2, Vector3 } from "three";
+import { type PerspectiveCamera, Plane, Ray, Vector3 } from "three";
 import { projectBox, type ScreenBox, type WorldExtent } from "./screen-box";
 
 /** Position in the picture, in CSS pixels from the upper left corner. */
@@ -12,7 +12,6 @@ export class ScreenProjection {
   width = 1;
   height = 1;
   readonly #camera: PerspectiveCamera;
-  readonly #raycaster = new Raycaster();
 
   constructor(camera: PerspectiveCamera) {
     this.#camera = camera;
@@ -29,10 +28,11 @@ export class ScreenProjection {
    * camera.
    */
   fromScreen(x: number, y: number, through: Vector3): Vector3 | null {
-    const clip = new Vector2((x / this.width) * 2 - 1, 1 - (y / this.height) * 2);
-    this.#raycaster.setFromCamera(clip, this.#camera);
+    const eye = new Vector3().setFromMatrixPosition(this.#camera.matrixWorld);
+    const clip = new Vector3((x / this.width) * 2 - 1, 1 - (y / this.height) * 2, 0.5);
+    const ray = new Ray(eye, clip.unproject(this.#camera).sub(eye).normalize());
     const plane = new Plane().setFromNormalAndCoplanarPoint(this.#camera.getWorldDirection(new Vector3()), through);
-    return this.#raycaster.ray.intersectPlane(plane, new Vector3());
+    return ray.intersectPlane(plane, new Vector3());
   }
 
   /** Return the box in the picture around a world position. */

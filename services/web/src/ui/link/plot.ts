@@ -1,21 +1,7 @@
 /** Small line or area plot of one quantity over the last minute. */
 import { translate } from "../../i18n/translator";
 import { element, setAttribute, setText, shape } from "../dom";
-
-/** Newest `length` samples of a quantity; NaN marks a gap. */
-export class SampleHistory {
-  readonly values: number[] = [];
-  readonly #capacity: number;
-
-  constructor(length: number) {
-    this.#capacity = length;
-  }
-
-  push(value: number): void {
-    this.values.push(value);
-    if (this.values.length > this.#capacity) this.values.shift();
-  }
-}
+import type { SampleHistory } from "./sample-history";
 
 export const PLOT_WIDTH = 100;
 export const PLOT_HEIGHT = 34;

@@ -2,7 +2,7 @@
 import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
 import { evaluateInEngine } from "../../browser/engine-probe";
-import { LEFT_HAND, waitForFirstPose, waitForHold, waitForWelcome } from "../../browser/page-probe";
+import { LEFT_HAND, tapKey, waitForFirstPose, waitForHold, waitForWelcome } from "../../browser/page-probe";
 import { type BenchContext, type BenchFigures, percentile, roundTo, withPage } from "./bench";
 
 declare global {
@@ -99,7 +99,7 @@ async function measureDownloads(bench: BenchContext): Promise<BenchFigures> {
     await page.goto(bench.url);
     await waitForFirstPose(page);
     await waitForWelcome(page);
-    await page.keyboard.press("Digit2");
+    await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
     await page.waitForLoadState("networkidle");
     const listUrls = () => performance.getEntriesByType("resource").map(({ name }) => name);

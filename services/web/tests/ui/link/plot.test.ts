@@ -1,6 +1,7 @@
 import fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { areaPath, niceScaleMax, PLOT_HEIGHT, PLOT_WIDTH, SampleHistory, tracePath } from "../../../src/ui/link/plot";
+import { areaPath, niceScaleMax, PLOT_HEIGHT, PLOT_WIDTH, tracePath } from "../../../src/ui/link/plot";
+import { SampleHistory } from "../../../src/ui/link/sample-history";
 
 const samples = fc.array(fc.double({ min: 0, max: 1e6, noNaN: true }), { minLength: 1, maxLength: 120 });
 

@@ -1,0 +1,55 @@
+/** Export of motions as files, with its progress in the library. */
+import { downloadMotion } from "../client/motion-download";
+import { ProblemError } from "../client/problem";
+import { type ExportFormat, type ExportSource, exportFile } from "../export/export-file";
+import { fileName } from "../export/file-name";
+import { translate } from "../i18n/translator";
+import type { LibraryPanel } from "../ui/library/library-panel";
+import type { MotionItem } from "../ui/library/motion-item";
+
+/** Share of a download's progress that fetching its blocks takes; writing the file takes the rest. */
+const FETCH_PROGRESS_SHARE = 0.5;
+
+/**
+ * Write the whole motion of these performers to a file. Return the file and its name, or null if the user cancels.
+ * Rejects with ProblemError.
+ */
+export async function exportMotion(
+  library: Pick<LibraryPanel, "addDownload">,
+  motion: MotionItem,
+  format: ExportFormat,
+  performers: readonly number[],
+): Promise<{ file: Blob; name: string } | null> {
+  const abort = new AbortController();
+  const { signal } = abort;
+  const suffix =
+    performers.length < motion.performers ? `, ${translate("Dancer {number}", { number: performers[0] + 1 })}` : "";
+  const row = library.addDownload(`${motion.name}${suffix}, ${format.toUpperCase()}`, () => abort.abort());
+  try {
+    // The functions that build the puppet's model and face.
+    const { createPuppetModel, renderFacePng } = await import("../stage/puppet/puppet-model").catch(() => {
+      throw ProblemError.unreachable();
+    });
+    const sources: ExportSource[] = [];
+    for (const performer of performers) {
+      const onProgress = (share: number) =>
+        row.showProgress(
+          translate("fetching the dance"),
+          ((sources.length + share) / performers.length) * FETCH_PROGRESS_SHARE,
+        );
+      sources.push(await downloadMotion(motion.id, { performer, signal, onProgress }));
+    }
+    const file = await exportFile(format, motion.name, sources, {
+      puppets: { renderFacePng, createModel: createPuppetModel },
+      signal,
+      onProgress: (share) =>
+        row.showProgress(translate("writing the file"), FETCH_PROGRESS_SHARE + share * (1 - FETCH_PROGRESS_SHARE)),
+    });
+    return { file, name: fileName(motion.name, format, suffix) };
+  } catch (error) {
+    if (signal.aborted) return null;
+    throw error;
+  } finally {
+    row.remove();
+  }
+}

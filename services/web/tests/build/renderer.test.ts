@@ -1,0 +1,40 @@
+/** Modules of three.js's renderer that the build of the page replaces. */
+import { readFileSync } from "node:fs";
+import { resolve } from "node:path";
+import { expect, test } from "vitest";
+import { REPLACED_MODULES } from "../../vite.renderer.ts";
+
+const SOURCES = resolve(import.meta.dirname, "../../node_modules/three/src");
+/** Members that the renderer uses only while a session is presented, in the present version of three.js. */
+const SESSION_MEMBERS = ["cameraAutoUpdate", "getCamera", "getDepthSensingMesh", "hasDepthSensing", "updateCamera"];
+
+const read = (path: string) => readFileSync(resolve(SOURCES, path), "utf8");
+const evaluate = (path: string) =>
+  import(`data:text/javascript,${encodeURIComponent(REPLACED_MODULES[path])}`) as Promise<
+    Record<string, new () => object>
+  >;
+
+test("each replaced module exists and has the exports of its replacement", async () => {
+  for (const path of Object.keys(REPLACED_MODULES)) {
+    const [name] = Object.keys(await evaluate(path));
+    expect(read(path)).toMatch(new RegExp(`export (class|function|\\{) ?${name}\\b`));
+  }
+});
+
+test("the replaced WebXR manager has what the renderer uses without a session", async () => {
+  const { WebXRManager } = await evaluate("renderers/webxr/WebXRManager.js");
+  const xr = new WebXRManager();
+  const sources = read("renderers/WebGLRenderer.js") + read("renderers/webgl/WebGLBackground.js");
+  const used = new Set(Array.from(sources.matchAll(/\bxr\.(\w+)/g), ([, member]) => member));
+  expect(used.size).toBeGreaterThan(10);
+  expect([...used].filter((member) => !(member in xr)).sort()).toEqual(SESSION_MEMBERS);
+});
+
+test("the replaced groups of uniforms have what the renderer uses without groups", async () => {
+  const { WebGLUniformsGroups } = await evaluate("renderers/webgl/WebGLUniformsGroups.js");
+  const groups = new WebGLUniformsGroups();
+  const used = new Set(
+    Array.from(read("renderers/WebGLRenderer.js").matchAll(/uniformsGroups\.(\w+)\(/g), ([, member]) => member),
+  );
+  expect([...used].filter((member) => !(member in groups)).sort()).toEqual(["bind", "update"]);
+});
