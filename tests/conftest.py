@@ -31,6 +31,8 @@ DEFAULT_TIMEOUT_CONFIG.read = HANG_TIMEOUT_S
 # tests choose their settings, whatever the environment has
 for field in Settings.model_fields:
     os.environ.pop(f"BUNRAKU_{field.upper()}", None)
+# the limit of an upload is in wall time, of which a worker process on a loaded machine gets a small share
+os.environ["BUNRAKU_UPLOAD_SECONDS"] = str(HANG_TIMEOUT_S)
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
