@@ -136,10 +136,18 @@ async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, e
     for puppeteer in endpoint.stage.puppeteers:
         if puppeteer.id == dead.id:
             puppeteer.last_heard_us -= stage_endpoint.PUPPETEER_TIMEOUT_US
+
+    async def send_heartbeats() -> None:
+        while True:
+            stage.send(living, b"")
+            await asyncio.sleep(0.1)
+
+    heartbeats = asyncio.create_task(send_heartbeats())
     async with asyncio.timeout(HANG_TIMEOUT_S):
         while not dead.is_unknown:
             dead.has_messages.clear()
             await dead.has_messages.wait()
+    heartbeats.cancel()
     assert dead.is_unknown
     assert not living.is_unknown
     assert [one["name"] for one in endpoint.stage.presence.puppeteers] == ["living"]
