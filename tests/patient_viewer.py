@@ -15,7 +15,7 @@ from tests.time_limit import HANG_TIMEOUT_S
 
 
 class PatientViewer(Viewer):
-    """Viewer whose time to watch begins when it has a pose to show, and a block of audio if the motion has any."""
+    """Viewer whose time to watch begins when it knows the time and has a pose to show, and sound if there is any."""
 
     async def _render(self, *arguments: Any) -> None:
         async with asyncio.timeout(HANG_TIMEOUT_S):
@@ -26,7 +26,7 @@ class PatientViewer(Viewer):
     @property
     def _is_ready(self) -> bool:
         local = self._local_clock()
-        if self.pose_at(self.clock.at(local) - round(self._delay.at(local))) is None:
+        if not self.clock.is_synchronised or self.pose_at(self.clock.at(local) - round(self._delay.at(local))) is None:
             return False
         return self.audio is None or self.statistics.audio_blocks > 0
 

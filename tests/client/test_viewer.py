@@ -103,8 +103,13 @@ async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> Non
     with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/filmed/stream?rate=1"))
         seen: dict[int, list[np.ndarray | None]] = {}
+        figures = viewer.statistics
         # the first block is sent again, better, only once the second is on show
-        figures = await viewer.watch(0.5, lambda t, _: seen.update({t: [viewer.scene_at(t, n) for n in (0, 1)]}))
+        await watch_until(
+            viewer,
+            lambda: min(figures.blocks, figures.camera_blocks, figures.light_blocks) >= 2,
+            lambda t, _: seen.update({t: [viewer.scene_at(t, n) for n in (0, 1)]}),
+        )
     assert [track.kind for track in viewer.scenes] == ["camera", "light"]
     assert (figures.blocks, figures.camera_blocks, figures.light_blocks) == (2, 2, 2)
     state = viewer.timeline_history.newest
@@ -136,7 +141,12 @@ async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:
     with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/sung/stream?rate=1"))
         ahead: dict[int, int] = {}
-        figures = await viewer.watch(1.0, lambda t, _: ahead.update({t: viewer.audio_buffered_us(t)}))
+        figures = viewer.statistics
+        await watch_until(
+            viewer,
+            lambda: min(figures.blocks, figures.audio_blocks) >= 2,
+            lambda t, _: ahead.update({t: viewer.audio_buffered_us(t)}),
+        )
     assert (figures.blocks, figures.audio_blocks) == (2, 2)
     assert figures.audio_rate >= 0
     state = viewer.timeline_history.newest
@@ -240,15 +250,19 @@ async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> N
         motion = (await client.upload(clip_file))["id"]
         door = CuttingProxy(client.socket_url(f"/v1/motions/{motion}/stream"), 2)
     async with door.open() as viewer:
-        shown = asyncio.Event()
-        watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
-        async with asyncio.timeout(HANG_TIMEOUT_S):
-            await shown.wait()
-        door.cut.set()
-        figures = await watching
+        frames = 0
+
+        def see(_reference: int, _pose: Pose) -> None:
+            nonlocal frames
+            if viewer.statistics.frames == 1:
+                door.cut.set()
+            # those after it was let in again
+            frames += bool(door.sent[2:] and door.sent[2])
+
+        await watch_until(viewer, lambda: frames > 30, see)
     assert len(door.queries) == 3
-    assert figures.reconnects == 2
-    assert figures.gaps == 0
+    assert viewer.reconnects == 2
+    assert viewer.statistics.gaps == 0
 
 
 async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what_it_holds(tmp_path: Path) -> None:
@@ -264,14 +278,17 @@ async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what
 
             def see(reference: int, _: Pose) -> None:
                 if viewer.pose_at(reference, 1) is not None:
-                    (again if len(door.queries) > 1 else shown).set()
+                    shown.set()
+                    if any(one[0] == Data.TYPE for sent in door.sent[1:] for one in sent):
+                        again.set()
 
-            watching = asyncio.create_task(viewer.watch(5.0, see))
+            watching = asyncio.create_task(viewer.watch(2 * HANG_TIMEOUT_S, see))
             async with asyncio.timeout(HANG_TIMEOUT_S):
                 await shown.wait()
                 door.cut.set()
                 await again.wait()
-            await watching
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
     held = ResumeState.parse(dict(parse_qsl(door.queries[1]))["have"])
     assert held.track_count == 2
     assert [max(rates) for _, rates in held.performers] == [1, 1]
@@ -314,7 +331,7 @@ async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_p
                 ):
                     best.set()
 
-            watching = asyncio.create_task(viewer.watch(60.0, see))
+            watching = asyncio.create_task(viewer.watch(2 * HANG_TIMEOUT_S, see))
             async with asyncio.timeout(HANG_TIMEOUT_S):
                 await best.wait()
             watching.cancel()

@@ -16,7 +16,7 @@ from bunraku.client import Client, Puppeteer, ServerProblem, Viewer
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout.block_store import Pose
 from bunraku.runtime.clock import clock
-from tests.patient_viewer import watch_until
+from tests.patient_viewer import PatientViewer, watch_until
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import HANG_TIMEOUT_S
 
@@ -135,7 +135,7 @@ def test_keep_command_accepts_session_id_and_page_url(server: str, clip_file: Pa
     async def open_session() -> str:
         async with Client(server) as client:
             session: str = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
-            await Viewer(client.socket_url(f"/v1/sessions/{session}/stream")).watch(0.5)
+            await PatientViewer(client.socket_url(f"/v1/sessions/{session}/stream")).watch(0.5)
         return session
 
     session = asyncio.run(open_session())
