@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Coroutine
 from random import Random
+from typing import ParamSpec
 
 from tests.simulation.event_loop import VirtualEventLoop
+
+Parameters = ParamSpec("Parameters")
 
 START_US = 1_750_000_000_000_000
 """Clock time at the start."""
@@ -22,3 +26,13 @@ def run_in_virtual_time(scenario: Callable[[Callable[[], int]], Coroutine[object
     finally:
         loop.close()
     assert loop.unhandled == []
+
+
+def in_virtual_time(test: Callable[Parameters, Coroutine[object, object, None]]) -> Callable[Parameters, None]:
+    """Decorate a test, a coroutine, so that it runs in virtual time; its fixtures do not."""
+
+    @functools.wraps(test)
+    def run(*arguments: Parameters.args, **options: Parameters.kwargs) -> None:
+        run_in_virtual_time(lambda _: test(*arguments, **options))
+
+    return run
