@@ -17,6 +17,7 @@ import hypothesis
 import pytest
 from httpx2._config import DEFAULT_TIMEOUT_CONFIG
 
+from bunraku.client import puppeteer
 from bunraku.runtime.settings import Settings
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import COROUTINE_TIMEOUT_S, HANG_TIMEOUT_S
@@ -27,6 +28,7 @@ hypothesis.settings.load_profile("bunraku")
 
 # the default of 5 s suits interactive use, not a loaded machine
 DEFAULT_TIMEOUT_CONFIG.read = HANG_TIMEOUT_S
+puppeteer.ANSWER_TIMEOUT_S = HANG_TIMEOUT_S
 
 # tests choose their settings, whatever the environment has
 for field in Settings.model_fields:
