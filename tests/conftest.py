@@ -17,6 +17,7 @@ import hypothesis
 import pytest
 from httpx2._config import DEFAULT_TIMEOUT_CONFIG
 
+from bunraku.client import puppeteer
 from bunraku.runtime.settings import Settings
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import COROUTINE_TIMEOUT_S, HANG_TIMEOUT_S
@@ -27,10 +28,13 @@ hypothesis.settings.load_profile("bunraku")
 
 # the default of 5 s suits interactive use, not a loaded machine
 DEFAULT_TIMEOUT_CONFIG.read = HANG_TIMEOUT_S
+puppeteer.ANSWER_TIMEOUT_S = HANG_TIMEOUT_S
 
 # tests choose their settings, whatever the environment has
 for field in Settings.model_fields:
     os.environ.pop(f"BUNRAKU_{field.upper()}", None)
+# the limit of an upload is in wall time, of which a worker process on a loaded machine gets a small share
+os.environ["BUNRAKU_UPLOAD_SECONDS"] = str(HANG_TIMEOUT_S)
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 

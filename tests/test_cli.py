@@ -14,11 +14,15 @@ from typer.testing import CliRunner
 from bunraku import __version__
 from bunraku.cli import app
 from tests.audio import make_tone, write_audio
+from tests.patient_viewer import use_patient_viewers
 
 RUN = CliRunner()
 
 
-def test_upload_list_watch_and_version_print_json(server: str, clip_file: Path) -> None:
+def test_upload_list_watch_and_version_print_json(
+    server: str, clip_file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use_patient_viewers(monkeypatch)
     uploaded = RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"])
     assert uploaded.exit_code == 0, uploaded.output
     motion = json.loads(uploaded.stdout)["id"]
@@ -34,7 +38,10 @@ def test_upload_list_watch_and_version_print_json(server: str, clip_file: Path) 
     assert json.loads(RUN.invoke(app, ["version", "--json"]).stdout) == {"version": __version__}
 
 
-def test_audio_creates_a_motion_with_sound(server: str, clip_file: Path, tmp_path: Path) -> None:
+def test_audio_creates_a_motion_with_sound(
+    server: str, clip_file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    use_patient_viewers(monkeypatch)
     song = str(write_audio(tmp_path / "song.wav", make_tone(1.0, 48_000), 48_000))
     motion = json.loads(RUN.invoke(app, ["upload", str(clip_file), "--server", server, "--json"]).stdout)["id"]
     added = RUN.invoke(app, ["audio", f"{server}/v1/motions/{motion}", song, "--json"])

@@ -19,6 +19,7 @@ from bunraku.http.access_control import Role
 from bunraku.http.access_token import TokenSigner
 from bunraku.http.secret import SECRET_FILE_NAME, load_or_create_secret
 from tests.credentials import SECRET, bearer_headers, make_token
+from tests.patient_viewer import use_patient_viewers
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import HANG_TIMEOUT_S
 
@@ -93,6 +94,7 @@ def test_share_says_that_the_link_ends_with_the_token(
 
 
 def test_share_creates_lists_and_revokes_links(protected: tuple[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    use_patient_viewers(monkeypatch)
     url, session = protected
     monkeypatch.setenv("BUNRAKU_TOKEN", make_token(Role.CONTROL, "host"))
     created = json.loads(RUN.invoke(app, ["share", session, "--server", url, "--days", "1", "--json"]).stdout)

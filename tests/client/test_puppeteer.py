@@ -9,10 +9,27 @@ import pytest
 
 from bunraku.client import Client, ControlRefused, OneEuro, Puppeteer, Viewer
 from bunraku.motion import rotation
+from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
 from bunraku.playout.block_store import Pose
 from bunraku.wire.messages import Input, unpack
+from tests.patient_viewer import watch_until
 from tests.time_limit import HANG_TIMEOUT_S
+
+TARGET = (0.3, 0.5, 0.4)
+
+
+def seen_hand(viewer: Viewer, pose: Pose) -> Array:
+    """Return the position (3,) of the left hand's tip in the shoulder's frame, arm lengths."""
+    assert viewer.track is not None
+    figure = viewer.track.figure
+    position, orientation = world_transforms(figure, *pose)
+    shoulder, wrist, chest = JOINT_INDEX["l_shoulder"], JOINT_INDEX["l_wrist"], JOINT_INDEX["vl5"]
+    tip = position[wrist] + rotation.rotate(orientation[wrist], figure.tips[wrist])
+    length = sum(np.linalg.norm(figure.offsets[JOINT_INDEX[j]]) for j in ("l_elbow", "l_wrist")) + np.linalg.norm(
+        figure.tips[wrist]
+    )
+    return rotation.rotate(rotation.conjugate(orientation[chest]), tip - position[shoulder]) / length
 
 
 @pytest.mark.parametrize("silent", [False, True], ids=["heard all along", "silent for a while"])
@@ -20,28 +37,22 @@ async def test_a_pulled_hand_is_seen_where_it_was_pulled_by_others(server: str, 
     async with Client(server) as client:
         session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
         viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream?rate=3"))
-        shown: dict[int, Pose] = {}
+        shown: list[Pose] = []
+
+        def is_hand_in_place() -> bool:
+            return viewer.statistics.overlays > 10 and bool(
+                np.allclose(seen_hand(viewer, shown[-1]), TARGET, atol=0.01)
+            )
+
         async with Puppeteer(client, session, "Aiko") as puppeteer:
             await puppeteer.claim("left_hand")
-            await puppeteer.target("left_hand", 0.3, 0.5, 0.4)
+            await puppeteer.target("left_hand", *TARGET)
             with httpx2.Client(base_url=server) as http:
                 # this process has something else to do until the hand is lost: it is taken again
                 while silent and http.get(f"/v1/sessions/{session}").json()["limbs"][0] == puppeteer.id:
                     pass
-            figures = await viewer.watch(2.5, shown.__setitem__)
+            await watch_until(viewer, is_hand_in_place, lambda _, pose: shown.append(pose))
             await puppeteer.release("left_hand")
-    assert figures.overlays > 10
-    assert viewer.track is not None
-    figure = viewer.track.figure
-    root, rotations = shown[max(shown)]
-    position, orientation = world_transforms(figure, root, rotations)
-    shoulder, wrist, chest = JOINT_INDEX["l_shoulder"], JOINT_INDEX["l_wrist"], JOINT_INDEX["vl5"]
-    tip = position[wrist] + rotation.rotate(orientation[wrist], figure.tips[wrist])
-    length = sum(np.linalg.norm(figure.offsets[JOINT_INDEX[j]]) for j in ("l_elbow", "l_wrist")) + np.linalg.norm(
-        figure.tips[wrist]
-    )
-    seen = rotation.rotate(rotation.conjugate(orientation[chest]), tip - position[shoulder]) / length
-    np.testing.assert_allclose(seen, [0.3, 0.5, 0.4], atol=0.01)
 
 
 async def test_pulling_what_one_does_not_hold_is_refused(server: str, clip_file: Path) -> None:

@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager, suppress
 
 import pytest
 from websockets.asyncio.server import ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
 
 from bunraku.client import reconnecting_connection as lines
 from bunraku.client.reconnecting_connection import ReconnectingConnection, StreamEnded
@@ -72,6 +73,14 @@ async def test_one_that_is_lost_is_taken_up_again() -> None:
         assert (heard.open_count, line.reconnects) == (3, 2)
 
 
+async def send_often(connection: ServerConnection) -> None:
+    """Send messages until the connection is closed."""
+    with suppress(ConnectionClosed):
+        while True:
+            await connection.send(b"\2")
+            await asyncio.sleep(0.02)
+
+
 async def test_one_that_falls_silent_is_replaced_by_another_that_is_heard() -> None:
     ended, asked = asyncio.Event(), asyncio.Queue[bytes | str]()
 
@@ -82,8 +91,11 @@ async def test_one_that_falls_silent_is_replaced_by_another_that_is_heard() -> N
             await connection.wait_closed()
             ended.set()
         else:
+            # it does not fall silent, however long the rest of the test takes
+            sending = asyncio.create_task(send_often(connection))
             async for said in connection:
                 await asked.put(said)
+            sending.cancel()
 
     async with running_connection(handle, silence_timeout=0.1) as (line, heard, _):
         assert await heard.received.get() == b"\1"

@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from urllib.parse import parse_qsl
 
@@ -25,6 +27,7 @@ from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.audio import decode_opus, find_onset, make_click
+from tests.patient_viewer import PatientViewer, watch_until
 from tests.servers import run_server
 from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
@@ -40,7 +43,7 @@ async def test_it_shows_the_dance_that_was_uploaded(server: str, tmp_path: Path)
     source.write_bytes(make_bvh_clip(3.0, 77))
     async with Client(server) as client:
         motion = await client.upload(source)
-        viewer = Viewer(client.socket_url(f"/v1/motions/{motion['id']}/stream?rate=3"))
+        viewer = PatientViewer(client.socket_url(f"/v1/motions/{motion['id']}/stream?rate=3"))
         shown: dict[int, Pose] = {}
         figures = await viewer.watch(1.5, shown.__setitem__)
     assert figures.first_pose_ms is not None
@@ -61,14 +64,23 @@ async def test_it_shows_the_dance_that_was_uploaded(server: str, tmp_path: Path)
     assert error.mean() < 0.15  # within a frame's movement
 
 
+def is_settled(viewer: Viewer) -> bool:
+    """Return whether a viewer knows the time to half a frame and has all blocks of the highest level."""
+    clock, store = viewer.clock, viewer._blocks
+    if not clock.is_synchronised or store is None:
+        return False
+    uncertainty_us = clock.error_bound + abs(clock.offset - clock.slewed_offset)
+    return uncertainty_us < 8_000 and all(store.level(index) == 3 for index in range(store.track.block_count))
+
+
 async def test_two_viewers_of_a_session_show_the_same_pose_at_the_same_time(server: str, clip_file: Path) -> None:
     async with Client(server) as client:
         session = await client.open_session((await client.upload(clip_file))["id"])
         url = client.socket_url(f"/v1/sessions/{session['id']}/stream?rate=3")
         viewers = [Viewer(url), Viewer(url)]
-        await asyncio.gather(*(viewer.watch(1.0) for viewer in viewers))
+        await asyncio.gather(*(watch_until(viewer, partial(is_settled, viewer)) for viewer in viewers))
         # the same instant of the machine's clock, each by its own idea of the reference clock
-        now = __import__("time").monotonic_ns() // 1000
+        now = time.monotonic_ns() // 1000
         times = [viewer.clock.at(now) for viewer in viewers]
         assert abs(times[0] - times[1]) < 16_667
         poses = [viewer.pose_at(times[0]) for viewer in viewers]
@@ -91,8 +103,13 @@ async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> Non
     with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/filmed/stream?rate=1"))
         seen: dict[int, list[np.ndarray | None]] = {}
+        figures = viewer.statistics
         # the first block is sent again, better, only once the second is on show
-        figures = await viewer.watch(0.5, lambda t, _: seen.update({t: [viewer.scene_at(t, n) for n in (0, 1)]}))
+        await watch_until(
+            viewer,
+            lambda: min(figures.blocks, figures.camera_blocks, figures.light_blocks) >= 2,
+            lambda t, _: seen.update({t: [viewer.scene_at(t, n) for n in (0, 1)]}),
+        )
     assert [track.kind for track in viewer.scenes] == ["camera", "light"]
     assert (figures.blocks, figures.camera_blocks, figures.light_blocks) == (2, 2, 2)
     state = viewer.timeline_history.newest
@@ -124,7 +141,12 @@ async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:
     with run_server(tmp_path) as url:
         viewer = Viewer(Client(url).socket_url("/v1/motions/sung/stream?rate=1"))
         ahead: dict[int, int] = {}
-        figures = await viewer.watch(1.0, lambda t, _: ahead.update({t: viewer.audio_buffered_us(t)}))
+        figures = viewer.statistics
+        await watch_until(
+            viewer,
+            lambda: min(figures.blocks, figures.audio_blocks) >= 2,
+            lambda t, _: ahead.update({t: viewer.audio_buffered_us(t)}),
+        )
     assert (figures.blocks, figures.audio_blocks) == (2, 2)
     assert figures.audio_rate >= 0
     state = viewer.timeline_history.newest
@@ -228,15 +250,19 @@ async def test_who_is_told_to_come_again_does(server: str, clip_file: Path) -> N
         motion = (await client.upload(clip_file))["id"]
         door = CuttingProxy(client.socket_url(f"/v1/motions/{motion}/stream"), 2)
     async with door.open() as viewer:
-        shown = asyncio.Event()
-        watching = asyncio.create_task(viewer.watch(4.0, lambda _, __: shown.set()))
-        async with asyncio.timeout(HANG_TIMEOUT_S):
-            await shown.wait()
-        door.cut.set()
-        figures = await watching
+        frames = 0
+
+        def see(_reference: int, _pose: Pose) -> None:
+            nonlocal frames
+            if viewer.statistics.frames == 1:
+                door.cut.set()
+            # those after it was let in again
+            frames += bool(door.sent[2:] and door.sent[2])
+
+        await watch_until(viewer, lambda: frames > 30, see)
     assert len(door.queries) == 3
-    assert figures.reconnects == 2
-    assert figures.gaps == 0
+    assert viewer.reconnects == 2
+    assert viewer.statistics.gaps == 0
 
 
 async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what_it_holds(tmp_path: Path) -> None:
@@ -252,14 +278,17 @@ async def test_who_comes_back_tells_of_all_performers_and_is_not_sent_again_what
 
             def see(reference: int, _: Pose) -> None:
                 if viewer.pose_at(reference, 1) is not None:
-                    (again if len(door.queries) > 1 else shown).set()
+                    shown.set()
+                    if any(one[0] == Data.TYPE for sent in door.sent[1:] for one in sent):
+                        again.set()
 
-            watching = asyncio.create_task(viewer.watch(5.0, see))
+            watching = asyncio.create_task(viewer.watch(2 * HANG_TIMEOUT_S, see))
             async with asyncio.timeout(HANG_TIMEOUT_S):
                 await shown.wait()
                 door.cut.set()
                 await again.wait()
-            await watching
+            watching.cancel()
+            await asyncio.gather(watching, return_exceptions=True)
     held = ResumeState.parse(dict(parse_qsl(door.queries[1]))["have"])
     assert held.track_count == 2
     assert [max(rates) for _, rates in held.performers] == [1, 1]
@@ -302,7 +331,7 @@ async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_p
                 ):
                     best.set()
 
-            watching = asyncio.create_task(viewer.watch(60.0, see))
+            watching = asyncio.create_task(viewer.watch(2 * HANG_TIMEOUT_S, see))
             async with asyncio.timeout(HANG_TIMEOUT_S):
                 await best.wait()
             watching.cancel()

@@ -15,6 +15,7 @@ from websockets.asyncio.client import connect
 from websockets.asyncio.server import ServerConnection, serve
 
 from tests.conftest import REPOSITORY
+from tests.connection_limit import limit_connections
 from tests.credentials import SECRET
 from tests.processes import ServerProcess, find_program, free_port
 from tests.servers import run_server
@@ -236,7 +237,7 @@ async def test_forged_address_does_not_evade_a_limit(
 ) -> None:
     options: dict[str, Any] = {
         "secret": SECRET,
-        "connects": BURST / 10,
+        "connects": limit_connections(monkeypatch, BURST),
         # as docker-compose.yml
         "trusted_proxies": f"* {gateway_proxies}",
     }

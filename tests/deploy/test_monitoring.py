@@ -19,8 +19,9 @@ import httpx2
 import pytest
 import yaml
 
-from bunraku.client import Client, Puppeteer, Viewer
+from bunraku.client import Client, Puppeteer
 from tests.conftest import REPOSITORY
+from tests.patient_viewer import PatientViewer
 from tests.processes import ServerProcess, find_program, free_port, nats_url_of, run_jetstream
 from tests.servers import make_bvh_clip
 from tests.time_limit import HANG_TIMEOUT_S
@@ -106,7 +107,7 @@ async def use_services(services: dict[str, tuple[ServerProcess, int]], source: P
             await puppeteer.claim("left_hand")
             for step in range(10):
                 await puppeteer.target("left_hand", 0.3 + 0.01 * step, 0.1, 0.4)
-            await Viewer(Client(urls["stream"]).socket_url(f"/v1/sessions/{session}/stream")).watch(1)
+            await PatientViewer(Client(urls["stream"]).socket_url(f"/v1/sessions/{session}/stream")).watch(1)
     async with httpx2.AsyncClient(base_url=urls["stream"]) as http:
         assert (await http.get("/v1/nothing")).status_code == 404
 

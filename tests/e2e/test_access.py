@@ -351,8 +351,11 @@ async def test_websocket_closes_when_its_token_expires(guarded: GuardedServer) -
     assert await asyncio.gather(*connections) == [4401] * 4
 
 
-@pytest.mark.parametrize("token", [make_token(), make_token(Role.VIEW), None, "malformed"])
-def test_no_response_of_a_protected_route_is_cached_by_proxies(guarded: GuardedServer, token: str | None) -> None:
+@pytest.mark.parametrize("role_or_token", [Role.ADMIN, Role.VIEW, None, "malformed"])
+def test_no_response_of_a_protected_route_is_cached_by_proxies(
+    guarded: GuardedServer, role_or_token: Role | str | None
+) -> None:
+    token = make_token(role_or_token) if isinstance(role_or_token, Role) else role_or_token
     with httpx2.Client(base_url=guarded.url, headers=bearer_headers(token), timeout=HANG_TIMEOUT_S) as http:
         for (method, path), role in ROUTES.items():
             if role is None or method == "DELETE":

@@ -18,6 +18,7 @@ from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.playout.timeline import position_at
 from bunraku.wire.messages import Data, Description, unpack
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 LEFT_TIP, RIGHT_TIP = 19, 20
 
@@ -54,13 +55,18 @@ async def test_three_performers_are_controlled_independently(tmp_path: Path) -> 
             def record_poses(reference: int, _: Pose) -> None:
                 seen.append((reference, [viewer.pose_at(reference, nth) for nth in range(3)]))
 
-            async with Puppeteer(client, session) as aiko, Puppeteer(client, session) as ben:
-                watching = asyncio.create_task(viewer.watch(3.0, record_poses, frame_interval=1 / 30))
+            async with (
+                Puppeteer(client, session) as aiko,
+                Puppeteer(client, session) as ben,
+                asyncio.timeout(HANG_TIMEOUT_S),
+            ):
+                watching = asyncio.create_task(viewer.watch(2 * HANG_TIMEOUT_S, record_poses, frame_interval=1 / 30))
                 await aiko.claim("left_hand")
                 await ben.claim(9)
                 loop = asyncio.get_running_loop()
                 end = loop.time() + 2.5
-                while (now := loop.time()) < end:
+                # on a slow machine longer, until the viewer has shown enough frames
+                while (now := loop.time()) < end or len(seen) < 60:
                     await aiko.target("left_hand", 0.7, 0.5 + 0.3 * math.sin(4 * now), 0.4)
                     await ben.target(9, -0.6, 0.6, 0.5)
                     await asyncio.sleep(1 / 60)
@@ -68,7 +74,8 @@ async def test_three_performers_are_controlled_independently(tmp_path: Path) -> 
                 assert [limb for limb, holder in enumerate(viewer.presence.limbs) if holder is not None] == [0, 9]
                 assert len(viewer.presence.limbs) == 12
                 recorded = await client.record(session, None, 2.0)
-                await watching
+                watching.cancel()
+                await asyncio.gather(watching, return_exceptions=True)
     assert viewer.statistics.gaps == 0
     offsets: list[list[np.ndarray]] = [[], [], []]
     roots: list[list[np.ndarray]] = [[], [], []]

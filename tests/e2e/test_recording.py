@@ -16,25 +16,36 @@ from bunraku.client import Client, Puppeteer, ServerProblem, Viewer
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout.block_store import Pose
 from bunraku.runtime.clock import clock
+from tests.patient_viewer import PatientViewer, watch_until
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
 LIMB = "left_hand"
 
 
-async def watch_controlled_session(client: Client, session: str, seconds: float) -> tuple[Viewer, dict[int, Pose]]:
-    """Watch a session while its left hand is controlled; return the viewer and its poses by clock time."""
+async def watch_controlled_session(
+    client: Client, session: str, seconds: float, overlays: int
+) -> tuple[Viewer, dict[int, Pose]]:
+    """Watch a session while its left hand is controlled, for `seconds` and until the viewer has received `overlays`.
+
+    The viewer has also seen the hand return. Return the viewer and its poses by clock time.
+    """
     seen: dict[int, Pose] = {}
     viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"))
-    async with Puppeteer(client, session) as puppeteer:
-        watching = asyncio.create_task(viewer.watch(seconds + 1.0, seen.__setitem__))
+    async with Puppeteer(client, session) as puppeteer, asyncio.timeout(HANG_TIMEOUT_S):
+        watching = asyncio.create_task(viewer.watch(2 * HANG_TIMEOUT_S, seen.__setitem__))
         await puppeteer.claim(LIMB)
         loop = asyncio.get_running_loop()
         end = loop.time() + seconds
-        while (now := loop.time()) < end:
+        while (now := loop.time()) < end or viewer.statistics.overlays <= overlays:
             await puppeteer.target(LIMB, 0.7, 0.5 + 0.3 * math.sin(4 * now), 0.4)
             await asyncio.sleep(1 / 60)
         await puppeteer.release(LIMB)
-        await watching
+        end_us = clock() + 800_000
+        while not seen or max(seen) < end_us:  # noqa: ASYNC110
+            await asyncio.sleep(1 / 60)
+        watching.cancel()
+        await asyncio.gather(watching, return_exceptions=True)
     return viewer, seen
 
 
@@ -52,7 +63,7 @@ async def test_recording_replays_what_viewers_saw(tmp_path: Path) -> None:
         async with Client(url) as client:
             dance = await client.upload(source)
             session = (await client.open_session(dance["id"]))["id"]
-            viewer, seen = await watch_controlled_session(client, session, 2.0)
+            viewer, seen = await watch_controlled_session(client, session, 2.0, 20)
             camera = [
                 {"time": clock() - 3_000_000, "position": [0, 1.2, 4], "gaze": [0, 1, 0], "fov": 0.5},
                 {"time": clock(), "position": [2, 1.2, 3], "gaze": [0, 1, 0], "fov": 0.7},
@@ -65,11 +76,23 @@ async def test_recording_replays_what_viewers_saw(tmp_path: Path) -> None:
             assert (await client.motions())[0] == recorded
             assert recorded["tracks"] == ["motion", "camera"]
             again = Viewer(client.socket_url(f"/v1/motions/{recorded['id']}/stream"))
-            replayed: dict[int, Pose] = {}
-            statistics = await again.watch(3.2, replayed.__setitem__)
+
+            def has_whole_recording() -> bool:
+                """Return whether every block has arrived at the highest bitrate level."""
+                store = again._blocks
+                return (
+                    again.statistics.camera_blocks >= recorded["blocks"]
+                    and store is not None
+                    and all(
+                        store.level(index) == len(recorded["rates"]) - 1 for index in range(store.track.block_count)
+                    )
+                )
+
+            await watch_until(again, has_whole_recording)
+            statistics = again.statistics
             # a recording is a motion: a session can play it, and its limbs can be controlled
             second = (await client.open_session(recorded["id"]))["id"]
-            controlled, _ = await watch_controlled_session(client, second, 0.5)
+            controlled, _ = await watch_controlled_session(client, second, 0.5, 20)
             await client.delete_motion(dance["id"])
             assert (await client.motion(recorded["id"]))["id"] == recorded["id"]
     assert statistics.gaps == 0
@@ -112,7 +135,7 @@ def test_keep_command_accepts_session_id_and_page_url(server: str, clip_file: Pa
     async def open_session() -> str:
         async with Client(server) as client:
             session: str = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
-            await Viewer(client.socket_url(f"/v1/sessions/{session}/stream")).watch(0.5)
+            await PatientViewer(client.socket_url(f"/v1/sessions/{session}/stream")).watch(0.5)
         return session
 
     session = asyncio.run(open_session())

@@ -22,6 +22,7 @@ from websockets.typing import Origin, Subprotocol
 from bunraku.http import protocol
 from bunraku.http.access_control import Role
 from bunraku.wire.messages import MAX_CLIENT_MESSAGE_BYTES, SUBPROTOCOL
+from tests.connection_limit import limit_connections
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import HANG_TIMEOUT_S
@@ -29,11 +30,16 @@ from tests.time_limit import HANG_TIMEOUT_S
 
 @pytest.fixture(scope="module")
 def guarded(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    options: dict[str, Any] = {"secret": SECRET, "connects": 20.0, "body_seconds": 1.0, "quota_motions": 2}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(protocol, "HEADER_TIMEOUT_S", 1.0)
-        with run_server(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **options) as url:
-            yield url
+    options: dict[str, Any] = {"secret": SECRET, "body_seconds": HANG_TIMEOUT_S, "quota_motions": 2}
+    with run_server(tmp_path_factory.mktemp("limits"), upload_bytes=1 << 20, **options) as url:
+        yield url
+
+
+@pytest.fixture(scope="module")
+def impatient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """Return a server that rejects slow bodies after a second."""
+    with run_server(tmp_path_factory.mktemp("impatient"), secret=SECRET, body_seconds=1.0) as url:
+        yield url
 
 
 def temporary_files() -> set[Path]:
@@ -86,32 +92,35 @@ def response_status(response: bytes) -> int:
     return int(response.split(b" ", 2)[1])
 
 
-async def test_slow_upload_is_rejected_with_408_and_leaves_nothing(guarded: str) -> None:
-    before, files_before = motion_count(guarded), temporary_files()
+async def test_slow_upload_is_rejected_with_408_and_leaves_nothing(impatient: str) -> None:
+    before, files_before = motion_count(impatient), temporary_files()
     head = request_head("POST", "/v1/motions?filename=a.bvh", "Content-Length: 100000")
-    response = await send_raw(guarded, head, *[b"x"] * 1_000, interval_s=0.05)
+    response = await send_raw(impatient, head, *[b"x"] * 1_000, interval_s=0.05)
     assert response_status(response) == 408
     assert b"too slowly" in response
     chunked = request_head("POST", "/v1/motions?filename=a.bvh", "Transfer-Encoding: chunked")
-    assert response_status(await send_raw(guarded, chunked, *[b"1\r\nx\r\n"] * 1_000, interval_s=0.05)) == 408
+    assert response_status(await send_raw(impatient, chunked, *[b"1\r\nx\r\n"] * 1_000, interval_s=0.05)) == 408
     # an upload that stops
-    assert response_status(await send_raw(guarded, head, b"x" * 500)) == 408
-    assert motion_count(guarded) == before
+    assert response_status(await send_raw(impatient, head, b"x" * 500)) == 408
+    assert motion_count(impatient) == before
     assert temporary_files() <= files_before
 
 
 @pytest.mark.parametrize("path", ["/v1/sessions", "/v1/solve", "/v1/shares"])
-async def test_slow_body_is_rejected_with_408(guarded: str, path: str) -> None:
+async def test_slow_body_is_rejected_with_408(impatient: str, path: str) -> None:
     head = request_head("POST", path, "Content-Length: 1000", "Content-Type: application/json")
-    assert response_status(await send_raw(guarded, head, *[b" "] * 900, interval_s=0.05)) == 408
+    assert response_status(await send_raw(impatient, head, *[b" "] * 900, interval_s=0.05)) == 408
 
 
-async def test_slow_request_head_is_closed_without_delaying_others(guarded: str) -> None:
+async def test_slow_request_head_is_closed_without_delaying_others(
+    impatient: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(protocol, "HEADER_TIMEOUT_S", 1.0)
     slow_requests = [
-        asyncio.create_task(send_raw(guarded, b"GET /v1/health HTTP/1.1\r\n", *[b"a"] * 1_000, interval_s=0.05))
+        asyncio.create_task(send_raw(impatient, b"GET /v1/health HTTP/1.1\r\n", *[b"a"] * 1_000, interval_s=0.05))
     ]
-    slow_requests.append(asyncio.create_task(send_raw(guarded)))
-    async with httpx2.AsyncClient(base_url=guarded) as http:
+    slow_requests.append(asyncio.create_task(send_raw(impatient)))
+    async with httpx2.AsyncClient(base_url=impatient) as http:
         assert (await http.get("/v1/health")).status_code == 200
     assert await asyncio.gather(*slow_requests) == [b"", b""]
 
@@ -178,23 +187,24 @@ async def test_hostile_json_is_rejected_with_4xx(guarded: str, path: str, body: 
     json.loads(response.text)
 
 
-async def test_too_many_handshakes_are_rejected_with_429(guarded: str) -> None:
-    address = guarded.replace("http", "ws") + "/v1/motions/none/stream"
+async def test_too_many_handshakes_are_rejected_with_429(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with run_server(tmp_path, secret=SECRET, connects=limit_connections(monkeypatch, 20)) as url:
+        address = url.replace("http", "ws") + "/v1/motions/none/stream"
 
-    async def connect_repeatedly() -> None:
-        for _ in range(400):
-            async with connect(
-                address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=bearer_headers(make_token())
-            ) as socket:
-                with contextlib.suppress(ConnectionClosed):
-                    await socket.recv()
+        async def connect_repeatedly() -> None:
+            for _ in range(40):
+                async with connect(
+                    address, subprotocols=[Subprotocol(SUBPROTOCOL)], additional_headers=bearer_headers(make_token())
+                ) as socket:
+                    with contextlib.suppress(ConnectionClosed):
+                        await socket.recv()
 
-    with pytest.raises(InvalidStatus) as refused:
-        await connect_repeatedly()
-    assert refused.value.response.status_code == 429
-    assert refused.value.response.headers["Retry-After"] == "1"
-    # requests with a token are still accepted
-    assert (await asyncio.to_thread(motion_count, guarded)) >= 0
+        with pytest.raises(InvalidStatus) as refused:
+            await connect_repeatedly()
+        assert refused.value.response.status_code == 429
+        assert refused.value.response.headers["Retry-After"] == "1"
+        # requests with a token are still accepted
+        assert (await asyncio.to_thread(motion_count, url)) >= 0
 
 
 @pytest.mark.parametrize("origin", ["https://evil.example", "null", "http://[::1"])

@@ -17,15 +17,15 @@ from bunraku.http.access_control import Role
 from bunraku.ingest.upload import MAX_UPLOADS_PER_HOLDER
 from tests.credentials import SECRET, bearer_headers, make_token
 from tests.servers import make_bvh_clip, run_server
+from tests.time_limit import HANG_TIMEOUT_S
 
-TIMEOUT_S = 60
 NAME = "upload-name-1"
 
 
 @pytest.fixture(scope="module")
 def patient(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Return the address of a server that waits long for stalled bodies."""
-    with run_server(tmp_path_factory.mktemp("patient"), secret=SECRET, connects=0, body_seconds=TIMEOUT_S) as url:
+    with run_server(tmp_path_factory.mktemp("patient"), secret=SECRET, connects=0, body_seconds=HANG_TIMEOUT_S) as url:
         yield url
 
 
@@ -61,20 +61,20 @@ async def stalled_upload(
 
 
 async def wait_for_uploads(count: int) -> None:
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         while len(upload_files()) != count:  # noqa: ASYNC110
             await asyncio.sleep(0.01)
 
 
 async def read_response(reader: asyncio.StreamReader) -> bytes:
-    async with asyncio.timeout(TIMEOUT_S):
+    async with asyncio.timeout(HANG_TIMEOUT_S):
         with contextlib.suppress(ConnectionError):
             return await reader.read(65_536)
     return b""
 
 
 async def test_stopped_uploads_leave_room_for_other_subjects(patient: str) -> None:
-    async with AsyncExitStack() as stack, httpx2.AsyncClient(base_url=patient, timeout=TIMEOUT_S) as http:
+    async with AsyncExitStack() as stack, httpx2.AsyncClient(base_url=patient, timeout=HANG_TIMEOUT_S) as http:
         for _ in range(MAX_UPLOADS_PER_HOLDER):
             await stack.enter_async_context(stalled_upload(patient, "mallory"))
         await wait_for_uploads(MAX_UPLOADS_PER_HOLDER)
@@ -97,7 +97,7 @@ async def test_stopped_upload_is_ended_after_one_window(impatient: str) -> None:
 async def test_upload_names_of_other_subjects_are_neither_blocked_nor_visible(patient: str) -> None:
     async with (
         stalled_upload(patient, "mallory", f"&upload={NAME}"),
-        httpx2.AsyncClient(base_url=patient, timeout=TIMEOUT_S) as http,
+        httpx2.AsyncClient(base_url=patient, timeout=HANG_TIMEOUT_S) as http,
     ):
         await wait_for_uploads(1)
         own = await http.get(f"/v1/uploads/{NAME}", headers=uploader("mallory"))

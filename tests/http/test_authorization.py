@@ -29,7 +29,9 @@ from bunraku.runtime.settings import Settings
 from bunraku.serve import compose_app
 from bunraku.session.app import create_app as session
 from bunraku.stream.app import create_app as stream
+from tests.connection_limit import limit_connections
 from tests.credentials import SECRET, bearer_headers, make_token
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def test_every_route_declares_its_requirement(tmp_path: Path) -> None:
@@ -179,7 +181,7 @@ async def test_unfinished_bodies_are_limited_by_subject(tmp_path: Path) -> None:
             return await http.put("/v1/changed", content=content, headers=headers)
 
         begun = [asyncio.create_task(put("hostile", body())) for _ in range(MAX_REQUESTS_WITH_BODY_PER_HOLDER)]
-        async with asyncio.timeout(120):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
             await all_begun.wait()
         refused = await put("hostile", b"x")
         assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
@@ -190,8 +192,8 @@ async def test_unfinished_bodies_are_limited_by_subject(tmp_path: Path) -> None:
         assert (await put("hostile", b"x")).status_code == 200
 
 
-async def test_invalid_tokens_are_rate_limited_by_address(tmp_path: Path) -> None:
-    async with protected_app(tmp_path, secret=SECRET, connects=1.0) as (app, http):
+async def test_invalid_tokens_are_rate_limited_by_address(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    async with protected_app(tmp_path, secret=SECRET, connects=limit_connections(monkeypatch, 10)) as (app, http):
         statuses = [(await http.get("/v1/mine", headers=bearer_headers("guess"))).status_code for _ in range(12)]
         assert statuses == [401] * 10 + [429] * 2
         # a client with a valid token is not limited
@@ -264,8 +266,9 @@ async def test_changes_of_one_subject_are_limited_on_every_route(
         assert {(await http.patch("/v1/sessions/none", json={})).status_code for _ in range(12)} == {404}
 
 
-async def test_tickets_count_towards_the_connection_rate(tmp_path: Path) -> None:
-    async with compose_app(Settings(data=tmp_path, secret=SecretStr(SECRET), connects=1.0)) as app:
+async def test_tickets_count_towards_the_connection_rate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    connects = limit_connections(monkeypatch, 10)
+    async with compose_app(Settings(data=tmp_path, secret=SecretStr(SECRET), connects=connects)) as app:
         transport = httpx2.ASGITransport(app)
         async with httpx2.AsyncClient(
             transport=transport, base_url="http://stage", headers=bearer_headers(make_token())

@@ -12,6 +12,7 @@ from starlette.types import Receive, Scope, Send
 
 from bunraku.http.client_address import MAX_HOPS, ClientAddressMiddleware, TrustedProxies
 from bunraku.runtime.settings import Settings
+from tests.connection_limit import limit_connections
 from tests.credentials import SECRET
 from tests.servers import run_server
 
@@ -98,9 +99,10 @@ def addresses(last: str = "") -> list[str]:
     ],
 )
 async def test_limits_per_address_cannot_be_evaded(
-    proxies: str, forwarded: list[str], limited: bool, tmp_path: Path
+    proxies: str, forwarded: list[str], limited: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    options: dict[str, Any] = {"secret": SECRET, "connects": BURST / 10, "trusted_proxies": proxies}
+    connects = limit_connections(monkeypatch, BURST)
+    options: dict[str, Any] = {"secret": SECRET, "connects": connects, "trusted_proxies": proxies}
     with run_server(tmp_path, services=["stream"], **options) as url:
         statuses = await connect_statuses(url, forwarded)
     assert statuses[:BURST] == [401] * BURST

@@ -23,7 +23,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(0.5))
     shares: list[float] = []
-    result = await job_process.run_job(JobKind.MOTION, ("m1", source), 60, shares.append)
+    result = await job_process.run_job(JobKind.MOTION, ("m1", source), HANG_TIMEOUT_S, shares.append)
     assert isinstance(result, JobResult)
     assert result.description["frames"] == 15
     assert shares == sorted(set(shares))
@@ -32,7 +32,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
 
 
 async def test_crashed_job_is_a_rejection(tmp_path: Path) -> None:
-    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing"), 60)
+    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing"), HANG_TIMEOUT_S)
     assert isinstance(result, JobRejection)
     assert result.hint
 
@@ -41,7 +41,9 @@ async def test_cancelled_job_is_killed(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(60.0))
     encoding = asyncio.Event()
-    job = asyncio.create_task(job_process.run_job(JobKind.MOTION, ("m1", source), 60, lambda _: encoding.set()))
+    job = asyncio.create_task(
+        job_process.run_job(JobKind.MOTION, ("m1", source), HANG_TIMEOUT_S, lambda _: encoding.set())
+    )
     await encoding.wait()
     job.cancel()
     with pytest.raises(asyncio.CancelledError):

@@ -19,7 +19,7 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.runtime.temporary_folder import temporary_folder
-from bunraku.storage.record import CatalogueEntry, Job
+from bunraku.storage.record import CatalogueEntry, Job, JobHold
 from bunraku.storage.table import JOBS
 from tests.time_limit import HANG_TIMEOUT_S
 
@@ -149,6 +149,34 @@ async def test_abandoned_job_is_resumed_by_another_replica(
     assert other.requests == ["upload-01"]
     assert (failed.queue.resumed_jobs, other.queue.resumed_jobs) == (0, 1)
     await other.stop()
+
+
+async def test_resumed_job_is_not_run_again_while_it_is_discarded(
+    context: ServiceContext, source: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    catalogue, searches = context.catalogue, 0
+    list_job_holds, remove_job = catalogue.list_job_holds, catalogue.remove_job
+
+    async def count_search(limit: int) -> dict[str, JobHold]:
+        nonlocal searches
+        searches += 1
+        return await list_job_holds(limit)
+
+    async def remove_slowly(job_id: str) -> None:
+        end = searches + 5
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while searches < end:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        await remove_job(job_id)
+
+    monkeypatch.setattr(catalogue, "list_job_holds", count_search)
+    monkeypatch.setattr(catalogue, "remove_job", remove_slowly)
+    await context.motion_store.put_source("j1", source)
+    await catalogue.add_job(Job("j1", 1, DETAILS), "failed", 0)
+    replica = QueueReplica(context)
+    await wait_until_empty(context)
+    assert len(replica.handled_jobs) == replica.queue.resumed_jobs == 1
+    await replica.stop()
 
 
 @pytest.mark.parametrize(

@@ -10,11 +10,13 @@ from bunraku.messaging.lease import hold_lease, wait_until_abandoned
 from bunraku.messaging.replica_registry import ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
 from tests.time_limit import HANG_TIMEOUT_S
+from tests.virtual_time import in_virtual_time
 
 TIMING = ReplicaTiming(heartbeat_s=0.05, timeout_s=0.5)
 POLL_S = 0.01
 
 
+@in_virtual_time
 async def test_holders_take_turns() -> None:
     store, active, max_active = MemoryKeyValueStore(), 0, 0
     finished: list[int] = []
@@ -36,6 +38,7 @@ async def test_holders_take_turns() -> None:
     assert store.watch().entries == {}
 
 
+@in_virtual_time
 async def test_held_lease_outlasts_its_timeout() -> None:
     store = MemoryKeyValueStore()
     async with AsyncExitStack() as stack:
@@ -48,6 +51,7 @@ async def test_held_lease_outlasts_its_timeout() -> None:
 
 
 @pytest.mark.parametrize("holder", [b"dead", b"\xff\x00 token of an earlier release"])
+@in_virtual_time
 async def test_abandoned_lease_is_taken(holder: bytes) -> None:
     store = MemoryKeyValueStore()
     await store.put("work", holder, 0)
@@ -57,6 +61,7 @@ async def test_abandoned_lease_is_taken(holder: bytes) -> None:
         assert entry.value != holder
 
 
+@in_virtual_time
 async def test_lease_whose_release_failed_ends_with_its_holder(monkeypatch: pytest.MonkeyPatch) -> None:
     store = MemoryKeyValueStore()
     remove = store.remove
@@ -73,6 +78,7 @@ async def test_lease_whose_release_failed_ends_with_its_holder(monkeypatch: pyte
         pass
 
 
+@in_virtual_time
 async def test_lease_of_a_stalled_holder_is_taken_after_the_timeout() -> None:
     store, loop = MemoryKeyValueStore(), asyncio.get_running_loop()
     holder = ReplicaRegistry(store, TIMING)
@@ -82,6 +88,7 @@ async def test_lease_of_a_stalled_holder_is_taken_after_the_timeout() -> None:
         assert loop.time() - begin > TIMING.timeout_s
 
 
+@in_virtual_time
 async def test_abandonment_is_noticed_while_the_holder_stays_registered() -> None:
     store = MemoryKeyValueStore()
     waiting = asyncio.create_task(wait_until_abandoned(store, "work", TIMING))

@@ -7,6 +7,7 @@ import json
 import socket
 import ssl
 import struct
+import time
 from collections.abc import AsyncIterator, Callable, Coroutine, Iterator
 from contextlib import asynccontextmanager, contextmanager, suppress
 from pathlib import Path
@@ -24,7 +25,15 @@ from tests.messaging.message_recorder import MessageRecorder
 from tests.processes import ServerProcess, run_nats_server
 from tests.time_limit import HANG_TIMEOUT_S
 
+CONNECT_TIMEOUT_S = 50.0
+"""Time limit of connecting on a slow machine, below that of a TLS handshake in asyncio, 60 s."""
 RUNNERS: dict[str, Callable[[Coroutine[Any, Any, None]], None]] = {"asyncio": asyncio.run, "uvloop": uvloop.run}
+
+
+@pytest.fixture(autouse=True)
+def _patient_handshakes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the time limit of connecting only end a handshake that hangs."""
+    monkeypatch.setattr(nats_connection, "CONNECT_TIMEOUT_S", CONNECT_TIMEOUT_S)
 
 
 class NoMessages:
@@ -223,16 +232,27 @@ async def run_plain_server(**info: object) -> AsyncIterator[PlainServer]:
             await asyncio.gather(*plain.connections)
 
 
-async def test_credentials_are_never_sent_unencrypted_to_a_tls_address() -> None:
+async def open_error_of_silent_server(url: str, plain: PlainServer, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Return why a connection fails whose time limit passes as soon as the server has received something."""
+    loop, skipped_s = asyncio.get_running_loop(), 0.0
+    with monkeypatch.context() as patch:
+        patch.setattr(loop, "time", lambda: time.monotonic() + skipped_s)
+        opening = asyncio.create_task(open_error(url))
+        await wait_until(lambda: len(plain.received) > 0)
+        skipped_s = CONNECT_TIMEOUT_S
+        return await opening
+
+
+async def test_credentials_are_never_sent_unencrypted_to_a_tls_address(monkeypatch: pytest.MonkeyPatch) -> None:
     async with run_plain_server() as plain:
         assert "does not offer TLS" in await open_error(f"tls://me:word@127.0.0.1:{plain.port}")
         assert not plain.received
     async with run_plain_server(tls_required=True) as plain:
         # offers TLS, but does not speak it
-        await open_error(f"tls://me:word@127.0.0.1:{plain.port}")
+        await open_error_of_silent_server(f"tls://me:word@127.0.0.1:{plain.port}", plain, monkeypatch)
         assert b"word" not in plain.received
     async with run_plain_server(tls_available=True) as plain:
-        await open_error(f"nats://me:word@127.0.0.1:{plain.port}")
+        await open_error_of_silent_server(f"nats://me:word@127.0.0.1:{plain.port}", plain, monkeypatch)
         assert b"word" not in plain.received
 
 
@@ -244,9 +264,9 @@ async def test_data_inserted_before_the_tls_handshake_is_rejected() -> None:
 
 
 async def test_silent_tls_handshake_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(nats_connection, "CONNECT_TIMEOUT_S", 0.3)
     async with run_plain_server(tls_required=True) as plain:
-        assert await open_error(f"tls://127.0.0.1:{plain.port}") == "the server does not respond"
+        url = f"tls://127.0.0.1:{plain.port}"
+        assert await open_error_of_silent_server(url, plain, monkeypatch) == "the server does not respond"
         # the TLS client hello was sent, and nothing else
         assert plain.received[:1] == b"\x16"
 

@@ -7,14 +7,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
-from bunraku.codec.container import StoredMotion, pack_motion
+from bunraku.codec.container import StoredMotion, pack_motion, unpack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.messaging.bus import MemoryBus
 from bunraku.session.puppeteer_roster import Puppeteer
 from bunraku.session.stage import (
     Stage,
 )
-from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import (
     Alive,
     Grant,
@@ -52,15 +51,10 @@ class StageMessages:
             count = len(found) + 1
 
 
-async def stored_motion(name: str, seed: int) -> StoredMotion:
-    store = MotionStore.open("memory:///")
-    await store.put(
-        name,
-        pack_motion(name, encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live")),
-    )
-    motion = await store.get(name)
-    assert motion is not None
-    return motion
+def stored_motion(name: str, seed: int) -> StoredMotion:
+    """Return a motion as the motion store returns it."""
+    encoded = encode_motion(random_motion(2.3, 30.0, seed), error_bounds_mm=(30.0, 5.0), grade="live")
+    return unpack_motion(name, pack_motion(name, encoded))
 
 
 @dataclass

@@ -22,7 +22,7 @@ MESSAGES_PER_ITERATION = 5
 
 @pytest.fixture
 async def stage() -> AsyncIterator[Stage]:
-    motion = await stored_motion("one", 1)
+    motion = stored_motion("one", 1)
     state = timeline.start("one", motion.first_track.duration_us, clock())
     opened = Stage(SessionStart("s", motion, state, state.clock), MemoryBus(), clock)
     yield opened

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 
 import msgpack
 import numpy as np
@@ -43,6 +43,7 @@ from bunraku.wire.overlay import Overlay
 from tests.ingest.jobs.motions import MOTIONS
 from tests.session.joined_stage import StageMessages, join_stage, keep_holding, last_grant, stored_motion
 from tests.time_limit import HANG_TIMEOUT_S
+from tests.virtual_time import run_in_virtual_time
 
 
 @pytest.fixture
@@ -50,27 +51,39 @@ async def bus() -> MemoryBus:
     return MemoryBus()
 
 
+async def open_stage(bus: MemoryBus, clock: Callable[[], int]) -> Stage:
+    await asyncio.to_thread(motion_decoder.warm_up)
+    motion = stored_motion("one", 5)
+    state = timeline.start("one", motion.first_track.duration_us, clock())
+    return Stage(SessionStart("s", motion, state, state.clock), bus, clock)
+
+
 @pytest.fixture
 async def stage(bus: MemoryBus) -> AsyncIterator[Stage]:
-    await asyncio.to_thread(motion_decoder.warm_up)
-    motion = await stored_motion("one", 5)
-    state = timeline.start("one", motion.first_track.duration_us, clock())
-    opened = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
+    opened = await open_stage(bus, clock)
     yield opened
     await opened.close()
 
 
-async def test_overlays_have_only_controlled_limbs_and_end_with_an_empty_one(stage: Stage, bus: MemoryBus) -> None:
-    audience = StageMessages(bus)
-    aiko = join_stage(stage, "Aiko")
-    stage.receive(aiko.puppeteer, Claim(0))
-    epoch = last_grant(aiko).epoch
-    await audience.wait_for(5, Overlay)
-    stage.receive(aiko.puppeteer, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
-    await audience.wait_for(20, Overlay)
-    stage.receive(aiko.puppeteer, Release(0, epoch))
-    await audience.wait_until_at_rest()
-    overlays = [m for m in audience.messages if isinstance(m, Overlay)]
+def test_overlays_have_only_controlled_limbs_and_end_with_an_empty_one() -> None:
+    overlays: list[Overlay] = []
+
+    async def control_a_hand(clock: Callable[[], int]) -> None:
+        bus = MemoryBus()
+        stage, audience = await open_stage(bus, clock), StageMessages(bus)
+        aiko = join_stage(stage, "Aiko")
+        stage.receive(aiko.puppeteer, Claim(0))
+        epoch = last_grant(aiko).epoch
+        await audience.wait_for(5, Overlay)
+        stage.receive(aiko.puppeteer, Input(0, Input.TARGET, epoch, 1, 0, (0.5, 0.2, 0.4)))
+        await audience.wait_for(20, Overlay)
+        stage.receive(aiko.puppeteer, Release(0, epoch))
+        await audience.wait_until_at_rest()
+        overlays.extend(m for m in audience.messages if isinstance(m, Overlay))
+        await stage.close()
+
+    # a stage that is late sends fewer frames
+    run_in_virtual_time(control_a_hand)
     assert {tuple(o.limbs) for o in overlays} == {(0,), ()}
     assert [o.sequence for o in overlays] == list(range(overlays[0].sequence, overlays[0].sequence + len(overlays)))
     dues = np.diff([o.due for o in overlays])
@@ -105,7 +118,7 @@ async def test_edit_applies_after_the_lead_time(stage: Stage, bus: MemoryBus) ->
 async def test_limbs_stay_held_when_the_motion_changes(stage: Stage, bus: MemoryBus) -> None:
     audience = StageMessages(bus)
     aiko = join_stage(stage, "Aiko")
-    two = await stored_motion("two", 6)
+    two = stored_motion("two", 6)
     stage.receive(aiko.puppeteer, Claim(3))
     async with keep_holding(stage, aiko, 3):
         await audience.wait_for(2, Overlay)
@@ -177,20 +190,26 @@ async def test_subject_has_one_place_among_those_who_ask_for_a_limb(stage: Stage
     assert stage.presence.asks[1] == [ben.id, names[1].id]
 
 
-async def test_flood_of_changes_is_published_at_a_limited_rate(stage: Stage, bus: MemoryBus) -> None:
-    audience = StageMessages(bus)
-    aiko = join_stage(stage, "Aiko")
-    for _ in range(500):
-        stage.receive(aiko.puppeteer, Claim(1))
-        stage.receive(aiko.puppeteer, Release(1, last_grant(aiko).epoch))
-    stage.receive(aiko.puppeteer, Claim(2))
-    presences = [m for m in audience.messages if isinstance(m, Presence)]
-    assert len(presences) < 2 * PRESENCE_BURST
-    # the last change is published too
-    async with asyncio.timeout(HANG_TIMEOUT_S):
-        while presences[-1].limbs != stage.presence.limbs:
-            presences = [m for m in audience.messages if isinstance(m, Presence)]
-            await asyncio.sleep(0.01)
+def test_flood_of_changes_is_published_at_a_limited_rate() -> None:
+    async def flood(clock: Callable[[], int]) -> None:
+        bus = MemoryBus()
+        stage, audience = await open_stage(bus, clock), StageMessages(bus)
+        aiko = join_stage(stage, "Aiko")
+        for _ in range(500):
+            stage.receive(aiko.puppeteer, Claim(1))
+            stage.receive(aiko.puppeteer, Release(1, last_grant(aiko).epoch))
+        stage.receive(aiko.puppeteer, Claim(2))
+        presences = [m for m in audience.messages if isinstance(m, Presence)]
+        assert len(presences) < 2 * PRESENCE_BURST
+        # the last change is published too
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while presences[-1].limbs != stage.presence.limbs:
+                presences = [m for m in audience.messages if isinstance(m, Presence)]
+                await asyncio.sleep(0.01)
+        await stage.close()
+
+    # no time passes while the changes are made
+    run_in_virtual_time(flood)
 
 
 @pytest.mark.parametrize("message", [Alive([0]), Input(0, Input.TARGET, 1, 5, 0, (0.1, 0.0, 0.0))])
@@ -264,7 +283,7 @@ async def test_one_overlay_has_the_limbs_of_all_performers(bus: MemoryBus) -> No
     ]
     # Ben loses the leg of the removed second performer; Aiko keeps her hand
     async with keep_holding(stage, aiko, 1):
-        await change_motion(stage, await stored_motion("two", 6))
+        await change_motion(stage, stored_motion("two", 6))
     assert stage.presence.limbs == [None, aiko.id, None, None]
     assert Refusal(6, "lost") in map(unpack, ben.received)
     await audience.wait_for(1, TimelineState)

@@ -136,10 +136,18 @@ async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, e
     for puppeteer in endpoint.stage.puppeteers:
         if puppeteer.id == dead.id:
             puppeteer.last_heard_us -= stage_endpoint.PUPPETEER_TIMEOUT_US
+
+    async def send_heartbeats() -> None:
+        while True:
+            stage.send(living, b"")
+            await asyncio.sleep(0.1)
+
+    heartbeats = asyncio.create_task(send_heartbeats())
     async with asyncio.timeout(HANG_TIMEOUT_S):
         while not dead.is_unknown:
             dead.has_messages.clear()
             await dead.has_messages.wait()
+    heartbeats.cancel()
     assert dead.is_unknown
     assert not living.is_unknown
     assert [one["name"] for one in endpoint.stage.presence.puppeteers] == ["living"]
@@ -173,8 +181,12 @@ def test_viewer_counts_are_reported_more_often_than_they_expire() -> None:
     assert stage_endpoint.VIEWER_COUNT_TIMEOUT_US > 3e6 * VIEWER_COUNT_REFRESH_S
 
 
-@pytest.mark.usefixtures("endpoint")
-async def test_joins_of_one_subject_are_limited(context: ServiceContext) -> None:
+async def test_joins_of_one_subject_are_limited(
+    context: ServiceContext, endpoint: StageEndpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    # the clock stands still: a slow machine gets no tokens back between the joins
+    now = context.clock()
+    monkeypatch.setattr(endpoint, "_clock", lambda: now)
     for _ in range(stage_endpoint.JOIN_BURST):
         stage, connection = await join_stage(context, "flooder", "one link")
         stage.send(connection, None)

@@ -84,12 +84,19 @@ class Soak:
         minutes = 0
         while (left := began + self.options.minutes * 60 - time.monotonic()) > 0:
             await asyncio.sleep(min(left, 60.0))
+            if left <= 60.0:
+                await self._wait_for_minimum()
             minutes += 1
             figures = await asyncio.to_thread(audience.request, "figures")
             lost = await self.workload.find_lost_motions(CHECKED_EACH_MINUTE)
             measured = self.replicas.measure()
             print(format_minute(minutes, figures, measured, self.workload, len(lost), self.kills), flush=True)
         return figures
+
+    async def _wait_for_minimum(self) -> None:
+        """Wait until the least number of motions is acknowledged and a replica was killed, on a slow machine."""
+        while not self.kills or len(self.workload.acknowledged) < self.options.min_acknowledged:  # noqa: ASYNC110
+            await asyncio.sleep(0.1)
 
     async def _sample(self) -> None:
         while True:
@@ -163,6 +170,9 @@ def main() -> None:
     parser.add_argument("--viewers", type=int, default=500)
     parser.add_argument("--churn", type=float, default=10.0, help="viewers that leave, and that join, per second")
     parser.add_argument("--kill-minutes", type=float, default=5.0, help="interval between kills")
+    parser.add_argument(
+        "--min-acknowledged", type=int, default=0, help="the run lasts longer until so many motions are acknowledged"
+    )
     parser.add_argument("--max-gap-ms", type=float, default=MAX_GAP_P99_MS, help="limit of the overlay gap p99")
     options = parser.parse_args()
     # end the replicas as well if this process is terminated

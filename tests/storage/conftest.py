@@ -10,7 +10,9 @@ from pathlib import Path
 import asyncpg
 import pytest
 
+from bunraku.storage import catalogue_sql
 from tests.processes import ServerProcess, run_postgres
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 @pytest.fixture(scope="session")
@@ -34,8 +36,9 @@ def create_database(server: ServerProcess) -> str:
 
 
 @pytest.fixture
-def postgres_url(postgres_server: ServerProcess) -> str:
-    """Return the URL of a new, empty PostgreSQL database."""
+def postgres_url(postgres_server: ServerProcess, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Return the URL of a new, empty PostgreSQL database, for whose answers catalogues wait on a slow machine too."""
+    monkeypatch.setattr(catalogue_sql, "BACKEND_TIMEOUT_S", HANG_TIMEOUT_S)
     return create_database(postgres_server)
 
 

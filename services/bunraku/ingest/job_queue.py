@@ -192,11 +192,17 @@ class JobQueue:
 
     async def _resume_job(self, job: Job) -> None:
         """Run an abandoned job under the id of the request that uploaded it."""
-        with request_id.bind(job.details.get(REQUEST_ID_KEY, "")):
-            await self._run_resumed_job(job)
-
-    async def _run_resumed_job(self, job: Job) -> None:
         self.resumed_jobs += 1
+        try:
+            with request_id.bind(job.details.get(REQUEST_ID_KEY, "")):
+                if await self._run_resumed_job(job):
+                    await self.discard_job(job.id)
+        finally:
+            # held until it is removed, so that a slow catalogue does not make it look like one to be tried again
+            self._held_jobs.discard(job.id)
+
+    async def _run_resumed_job(self, job: Job) -> bool:
+        """Return whether the job is finished; a job that is not is tried again."""
         try:
             handler = self._handlers.get(job.details.get("kind", ""))
             with temporary_folder("job") as folder:
@@ -211,11 +217,9 @@ class JobQueue:
             if error.status >= 500:
                 # not caused by the file: the job is resumed again
                 _log.warning("Job %s failed: %s; trying again", job.id, error.detail)
-                return
+                return False
             _log.warning("Job %s failed: %s", job.id, error.detail)
         except BackendUnavailable as error:
             _log.warning("Job %s failed: %s; trying again", job.id, error)
-            return
-        finally:
-            self._held_jobs.discard(job.id)
-        await self.discard_job(job.id)
+            return False
+        return True
