@@ -60,13 +60,14 @@ async def send_packets(port: int, count: int) -> None:
             await asyncio.sleep(1 / FPS)
 
 
-def test_take_is_saved_at_ctrl_c_and_can_be_read_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "stopped"])
+def test_take_is_saved_at_its_end_and_can_be_read_again(tmp_path: Path, stop: signal.Signals) -> None:
     port, file = free_port(), tmp_path / "take.bvh"
 
     async def record() -> bytes:
         async with run_capture("vmc", str(file), "--port", str(port), "--fps", "60", "--json") as process:
             await send_packets(port, 90)
-            process.send_signal(signal.SIGINT)
+            process.send_signal(stop)
             output, errors = await process.communicate()
         assert process.returncode == 0, errors
         return output

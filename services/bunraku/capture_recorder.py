@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -88,7 +89,7 @@ def record_take(
     if not path.parent.is_dir():
         raise typer.BadParameter(f"there is no folder {path.parent}", param_hint="FILE")
     receiver = CaptureReceiver(assembler)
-    # Ctrl-C ends the take, which is saved
+    # where signals cannot be handled by the event loop
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(_receive(receiver, name, address, seconds, is_quiet=as_json or not err.is_terminal))
     calibration = receiver.session.calibration
@@ -118,10 +119,13 @@ async def _receive(
     receiver: CaptureReceiver, name: str, address: tuple[str, int], seconds: float | None, *, is_quiet: bool
 ) -> None:
     host, port = address
+    loop, stopped = asyncio.get_running_loop(), asyncio.Event()
+    # also if the process is stopped by another one: the take is saved
+    for number in (signal.SIGINT, signal.SIGTERM):
+        with contextlib.suppress(NotImplementedError):
+            loop.add_signal_handler(number, stopped.set)
     try:
-        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
-            lambda: receiver, local_addr=(host, port)
-        )
+        transport, _ = await loop.create_datagram_endpoint(lambda: receiver, local_addr=(host, port))
     except OSError as error:
         raise typer.BadParameter(f"cannot listen at {host}, port {port}: {error.strerror}") from None
     bound_port = transport.get_extra_info("sockname")[1]
@@ -129,15 +133,17 @@ async def _receive(
     status = None if is_quiet else err.status(Text("waiting for the first packet"))
     try:
         with status or contextlib.nullcontext():
-            await _follow(receiver, status, seconds)
+            await _follow(receiver, status, seconds, stopped)
     finally:
         transport.close()
 
 
-async def _follow(receiver: CaptureReceiver, status: Status | None, seconds: float | None) -> None:
+async def _follow(
+    receiver: CaptureReceiver, status: Status | None, seconds: float | None, stopped: asyncio.Event
+) -> None:
     """Poll the receiver and show its state until the take is over."""
     shown_at, shown_poses = time.monotonic(), 0
-    while not receiver.is_full:
+    while not (receiver.is_full or stopped.is_set()):
         poses = receiver.poses
         if seconds is not None and poses and poses[-1].time_s - poses[0].time_s >= seconds:
             return

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import math
+import signal
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Self
@@ -70,9 +72,15 @@ def send_session(
                     output.on_frame(reference, pose)
                     status_line.update()
 
+                watching = asyncio.create_task(viewer.watch(seconds or math.inf, on_frame, frame_interval=1 / fps))
+                _cancel_on_signal(watching)
                 try:
-                    await viewer.watch(seconds or math.inf, on_frame, frame_interval=1 / fps)
+                    # cancelled by a signal: the output ends properly
+                    await asyncio.wait((watching,))
+                    if not watching.cancelled():
+                        watching.result()
                 finally:
+                    watching.cancel()
                     output.finish()
                     statistics.update(
                         seconds=round(time.monotonic() - started_at, 3),
@@ -98,6 +106,14 @@ def send_session(
         raise typer.BadParameter(str(error), param_hint="--to") from None
     if statistics:
         print_statistics(statistics, as_json)
+
+
+def _cancel_on_signal(task: asyncio.Task[Any]) -> None:
+    """Cancel a task at Ctrl-C, and if the process is stopped by another one."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # where signals cannot be handled by the event loop, Ctrl-C is a KeyboardInterrupt
+        with contextlib.suppress(NotImplementedError):
+            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
 
 
 class _StatusLine:
