@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-import signal
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +19,7 @@ from bunraku.capture.frame import FrameAssembler
 from bunraku.capture.session import CaptureSession, TimedPose
 from bunraku.capture.take import MAX_TAKE_POSES, make_motion
 from bunraku.motion.bvh_writer import write_bvh
-from bunraku.terminal import err, print_statistics
+from bunraku.terminal import call_when_stopped, err, print_statistics
 
 POLL_INTERVAL_S = 0.02
 """Interval at which poses that wait for a missing one are looked at."""
@@ -89,7 +88,7 @@ def record_take(
     if not path.parent.is_dir():
         raise typer.BadParameter(f"there is no folder {path.parent}", param_hint="FILE")
     receiver = CaptureReceiver(assembler)
-    # where signals cannot be handled by the event loop
+    # Ctrl-C ends the take, which is saved
     with contextlib.suppress(KeyboardInterrupt):
         asyncio.run(_receive(receiver, name, address, seconds, is_quiet=as_json or not err.is_terminal))
     calibration = receiver.session.calibration
@@ -119,13 +118,12 @@ async def _receive(
     receiver: CaptureReceiver, name: str, address: tuple[str, int], seconds: float | None, *, is_quiet: bool
 ) -> None:
     host, port = address
-    loop, stopped = asyncio.get_running_loop(), asyncio.Event()
-    # also if the process is stopped by another one: the take is saved
-    for number in (signal.SIGINT, signal.SIGTERM):
-        with contextlib.suppress(NotImplementedError):
-            loop.add_signal_handler(number, stopped.set)
+    stopped = asyncio.Event()
+    call_when_stopped(stopped.set)
     try:
-        transport, _ = await loop.create_datagram_endpoint(lambda: receiver, local_addr=(host, port))
+        transport, _ = await asyncio.get_running_loop().create_datagram_endpoint(
+            lambda: receiver, local_addr=(host, port)
+        )
     except OSError as error:
         raise typer.BadParameter(f"cannot listen at {host}, port {port}: {error.strerror}") from None
     bound_port = transport.get_extra_info("sockname")[1]
@@ -184,7 +182,10 @@ def _write_new_file(path: Path, data: bytes) -> None:
     """Write a file completely or not at all; raise `typer.Exit` if that is not possible."""
     partial = path.with_name(f"{path.stem}.{os.getpid()}.part{path.suffix}")
     try:
-        partial.write_bytes(data)
+        with partial.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
         if path.exists():
             err.print(f"{path} has appeared during the take, which is in {partial}", markup=False)
             raise typer.Exit(1)

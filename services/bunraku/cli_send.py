@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from bunraku.output import artnet, dmx, sacn
-from bunraku.session_sender import send_session
+from bunraku.session_sender import SendOptions, send_session
 from bunraku.terminal import DEFAULT_SERVER, JsonOption, ServerOption, TokenOption
 
 if TYPE_CHECKING:
@@ -73,12 +73,7 @@ def send_vmc(
         make_output,
         "VMC",
         _parse_target(to, vmc.DEFAULT_PORT),
-        session=session,
-        fps=fps,
-        seconds=seconds,
-        server=server,
-        token=token,
-        as_json=as_json,
+        SendOptions(session, fps, seconds, server, token, as_json),
     )
 
 
@@ -103,12 +98,7 @@ def send_osc(
         make_output,
         "OSC",
         _parse_target(to, None),
-        session=session,
-        fps=fps,
-        seconds=seconds,
-        server=server,
-        token=token,
-        as_json=as_json,
+        SendOptions(session, fps, seconds, server, token, as_json),
     )
 
 
@@ -161,12 +151,7 @@ def send_dmx(
         make_output,
         protocol.label,
         target,
-        session=session,
-        fps=fps,
-        seconds=seconds,
-        server=server,
-        token=token,
-        as_json=as_json,
+        SendOptions(session, fps, seconds, server, token, as_json),
     )
 
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-import signal
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 from urllib.parse import quote
 
 import typer
 from rich.text import Text
 
-from bunraku.terminal import err, parse_resource_address, print_statistics, run_request
+from bunraku.terminal import call_when_stopped, err, parse_resource_address, print_statistics, run_request
 
 if TYPE_CHECKING:
     from bunraku.client.datagram import DatagramSender
@@ -26,35 +25,42 @@ STATUS_INTERVAL_S = 0.25
 """Interval between updates of the status line."""
 
 
+class SendOptions(NamedTuple):
+    """Options that all formats have."""
+
+    session: str
+    """Id or address of the session."""
+    fps: float
+    """Frames per second."""
+    seconds: float | None
+    """Duration; None: until Ctrl-C."""
+    server: str
+    """Address of the server, if `session` is only an id."""
+    token: str | None
+    """Access token of the server, if it needs one."""
+    as_json: bool
+    """Print JSON, and no status line."""
+
+
 def send_session(
     make_output: Callable[[Viewer, DatagramSender], StageOutput],
     format_name: str,
     target: tuple[str, int],
-    *,
-    session: str,
-    fps: float,
-    seconds: float | None,
-    server: str,
-    token: str | None,
-    as_json: bool,
+    options: SendOptions,
 ) -> None:
-    """Watch a session and send its frames until Ctrl-C or for `seconds`, then print statistics.
+    """Watch a session and send its frames until Ctrl-C or for `options.seconds`, then print statistics.
 
     Args:
         make_output: Function that creates the output; it gets the viewer and the socket.
         format_name: Name of the format, for the status line.
         target: Host and port of the receiver.
-        session: Id or address of the session.
-        fps: Frames per second.
-        seconds: Duration; None: until Ctrl-C.
-        server: Address of the server, if `session` is only an id.
-        token: Access token of the server, if it needs one.
-        as_json: Print JSON, and no status line.
+        options: Session, rate and duration, server and output of the command.
     """
     from bunraku.client import Client, StreamEnded, Viewer
     from bunraku.client.datagram import AddressError, DatagramSender
     from bunraku.client.stage_output import PerformerMissing
 
+    session, fps, seconds, server, token, as_json = options
     base, kind, session_id = parse_resource_address(session)
     if kind == "motions":
         raise typer.BadParameter("this is the address of a motion; give a session", param_hint="SESSION")
@@ -73,9 +79,9 @@ def send_session(
                     status_line.update()
 
                 watching = asyncio.create_task(viewer.watch(seconds or math.inf, on_frame, frame_interval=1 / fps))
-                _cancel_on_signal(watching)
+                call_when_stopped(watching.cancel)
                 try:
-                    # cancelled by a signal: the output ends properly
+                    # a stopped command still ends its output
                     await asyncio.wait((watching,))
                     if not watching.cancelled():
                         watching.result()
@@ -106,14 +112,6 @@ def send_session(
         raise typer.BadParameter(str(error), param_hint="--to") from None
     if statistics:
         print_statistics(statistics, as_json)
-
-
-def _cancel_on_signal(task: asyncio.Task[Any]) -> None:
-    """Cancel a task at Ctrl-C, and if the process is stopped by another one."""
-    for number in (signal.SIGINT, signal.SIGTERM):
-        # where signals cannot be handled by the event loop, Ctrl-C is a KeyboardInterrupt
-        with contextlib.suppress(NotImplementedError):
-            asyncio.get_running_loop().add_signal_handler(number, task.cancel)
 
 
 class _StatusLine:

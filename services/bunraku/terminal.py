@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import re
+import signal
+import sys
 from collections.abc import Awaitable, Callable
 from json import dumps
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -114,6 +116,16 @@ async def resolve_stream_url(client: Client, address: str) -> str:
     if base is not None:
         return Client(base).socket_url(f"/v1/{kind}/{resource_id}/stream")
     return client.socket_url(f"/v1/{await find_resource_kind(client, resource_id)}/{resource_id}/stream")
+
+
+def call_when_stopped(stop: Callable[[], object]) -> None:
+    """Call `stop` in the running event loop at Ctrl-C, and if another process stops this one (SIGTERM).
+
+    On Windows, whose event loops handle no signals, Ctrl-C stays a KeyboardInterrupt.
+    """
+    if sys.platform != "win32":
+        for number in (signal.SIGINT, signal.SIGTERM):
+            asyncio.get_running_loop().add_signal_handler(number, stop)
 
 
 def run_request(request: Callable[[], Awaitable[Result]], server: str) -> Result:

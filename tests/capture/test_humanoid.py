@@ -4,11 +4,11 @@ import numpy as np
 
 from bunraku.capture.humanoid import (
     BONE_BY_LOWER_NAME,
-    FIGURE_JOINTS,
     PARENTS_BY_BONE,
     ROOT_NAME,
     standard_t_pose,
 )
+from bunraku.motion.humanoid import BONE_JOINTS
 from bunraku.motion.skeleton import JOINT_INDEX
 
 
@@ -21,13 +21,13 @@ def test_there_are_55_bones_with_parents_before_children() -> None:
 
 
 def test_bones_of_the_figure_exist() -> None:
-    assert FIGURE_JOINTS.keys() <= PARENTS_BY_BONE.keys()
-    assert set(FIGURE_JOINTS.values()) == JOINT_INDEX.keys() - {"humanoid_root"}
+    assert BONE_JOINTS.keys() <= PARENTS_BY_BONE.keys()
+    assert set(BONE_JOINTS.values()) == JOINT_INDEX.keys() - {"humanoid_root"}
 
 
 def test_standard_figure_stands_in_a_t_pose() -> None:
     places = {bone: np.array(place) for bone, place in standard_t_pose().items()}
-    assert places.keys() > FIGURE_JOINTS.keys()
+    assert places.keys() > BONE_JOINTS.keys()
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         for above, below in (("UpperArm", "LowerArm"), ("LowerArm", "Hand")):
             x, y, z = places[side + below] - places[side + above]

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
 from bunraku.motion import rotation
+from bunraku.motion.humanoid import BONE_JOINTS, BONE_PARENTS, BONES
 from bunraku.motion.skeleton import JOINT_INDEX, Figure, standard_figure, world_transforms
-from bunraku.output.humanoid import BONE_JOINTS, BONE_PARENTS, BONES
 from bunraku.output.osc import pack_datagrams
 from bunraku.output.vmc import make_frame
 from tests.output.bone_angles import FIGURE_JOINTS, MIRROR, max_bone_angle

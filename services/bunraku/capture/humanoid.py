@@ -6,7 +6,8 @@ Source: Unity Scripting API, `HumanBodyBones`. An optional bone that a sender om
 from __future__ import annotations
 
 from bunraku.marionette.solver.vector import Vector
-from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, JOINTS, PARENTS, standard_figure
+from bunraku.motion.humanoid import BONE_PARENTS, BONES, bone_offsets, rest_hips_position
+from bunraku.motion.skeleton import standard_figure
 
 ROOT_NAME = "Root"
 """Transform above the hips, which moves the whole avatar."""
@@ -52,42 +53,12 @@ PARENTS_BY_BONE: dict[str, str | None] = _list_bones()
 BONE_BY_LOWER_NAME: dict[str, str] = {name.lower(): name for name in PARENTS_BY_BONE if name != ROOT_NAME}
 """Bones by their names in lower case, as some senders differ in case."""
 
-FIGURE_JOINTS: dict[str, str] = {"Hips": "sacroiliac", "Spine": "vl5", "Head": "skullbase"} | {
-    bone.format(side): joint.format(letter)
-    for side, letter in (("Left", "l"), ("Right", "r"))
-    for bone, joint in (
-        ("{}UpperLeg", "{}_hip"),
-        ("{}LowerLeg", "{}_knee"),
-        ("{}Foot", "{}_ankle"),
-        ("{}Toes", "{}_midtarsal"),
-        ("{}UpperArm", "{}_shoulder"),
-        ("{}LowerArm", "{}_elbow"),
-        ("{}Hand", "{}_wrist"),
-    )
-}
-"""Joints of the figure by bone."""
-
-
-CHEST_SHARE = 0.4
-"""Height of the chest, as a share of the way from the spine to the middle of the shoulders."""
-CLAVICLE_SHARE = 0.25
-"""Position of a shoulder bone, as a share of the way from the middle of the shoulders to the upper arm."""
-
 
 def standard_t_pose() -> dict[str, Vector]:
     """Return the positions of the body's bones in the T-pose of the standard figure, metres, in the figure's axes."""
     figure = standard_figure()
-    positions = figure.offsets.copy()
-    for joint in range(1, JOINT_COUNT):
-        x, y, z = positions[joint].tolist()
-        if JOINTS[joint][2:] in ("elbow", "wrist"):
-            # the hanging arm raised sideways
-            x, y = (-y, x) if JOINTS[joint].startswith("l_") else (y, -x)
-        positions[joint] = (x, y, z) + positions[PARENTS[joint]]
-    bones = {bone: positions[JOINT_INDEX[joint]] for bone, joint in FIGURE_JOINTS.items()}
-    middle = 0.5 * (bones["LeftUpperArm"] + bones["RightUpperArm"])
-    bones["Chest"] = bones["UpperChest"] = bones["Spine"] + CHEST_SHARE * (middle - bones["Spine"])
-    bones["Neck"] = middle
-    for side in ("Left", "Right"):
-        bones[f"{side}Shoulder"] = middle + CLAVICLE_SHARE * (bones[f"{side}UpperArm"] - middle)
-    return {bone: (x, y, z) for bone, (x, y, z) in ((bone, place.tolist()) for bone, place in bones.items())}
+    positions = bone_offsets(figure)
+    positions[0] = rest_hips_position(figure)
+    for bone, parent in enumerate(BONE_PARENTS[1:], 1):
+        positions[bone] += positions[parent]
+    return {bone: (x, y, z) for bone, (x, y, z) in zip(BONES, positions.tolist(), strict=True)}

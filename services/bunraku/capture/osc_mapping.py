@@ -28,7 +28,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from bunraku.capture.errors import UnreadableCapture, quote_excerpt
-from bunraku.capture.humanoid import BONE_BY_LOWER_NAME, FIGURE_JOINTS, ROOT_NAME
+from bunraku.capture.humanoid import BONE_BY_LOWER_NAME, ROOT_NAME
+from bunraku.motion.humanoid import BONE_JOINTS
 
 MAX_MAPPING_BYTES = 1 << 16
 MAX_ENTRIES = 256
@@ -36,7 +37,7 @@ JOINT_PLACEHOLDER = "{joint}"
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001}
 
 _JOINTS: dict[str, str] = (
-    {joint: bone for bone, joint in FIGURE_JOINTS.items()} | BONE_BY_LOWER_NAME | {ROOT_NAME.lower(): ROOT_NAME}
+    {joint: bone for bone, joint in BONE_JOINTS.items()} | BONE_BY_LOWER_NAME | {ROOT_NAME.lower(): ROOT_NAME}
 )
 _EULER_ORDERS = ("xyz", "xzy", "yxz", "yzx", "zxy", "zyx")
 _QUATERNION_ORDERS = ("xyzw", "wxyz")

@@ -12,10 +12,10 @@ from __future__ import annotations
 import numpy as np
 from pythonosc.osc_message import OscMessage
 
+from bunraku.motion.humanoid import BONES, bone_offsets, bone_rotations, hips_position, rest_hips_position
 from bunraku.motion.rotation import IDENTITY, Array
 from bunraku.motion.skeleton import Figure
 from bunraku.motion.unity_axes import mirror_rotations, mirror_vectors, to_xyzw
-from bunraku.output.humanoid import BONES, bone_offsets, bone_rotations, hips_position, rest_hips_position
 from bunraku.output.osc import make_message
 
 DEFAULT_PORT = 39539

@@ -12,7 +12,6 @@ from collections.abc import Callable
 from typing import Any, cast
 
 from starlette.websockets import WebSocket, WebSocketDisconnect, WebSocketState
-from uvicorn._types import ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
@@ -100,7 +99,7 @@ class HandoffProtocol(WebSocketsSansIOProtocol):
             extensions[HANDOFF_EXTENSION] = {"take": self.detach}
             extensions[link.LINK_EXTENSION] = {"transport": self.transport}
 
-    async def send(self, message: ASGISendEvent) -> None:
+    async def send(self, message: Any) -> None:
         await super().send(message)
         if self.close_sent:
             # an HTTP response completes the handshake, too: otherwise each rejected client is logged as an error
