@@ -31,7 +31,7 @@ def test_arms_of_the_t_pose_are_level_and_the_rest_hangs_and_stands() -> None:
 
 def test_every_joint_is_where_its_bone_is() -> None:
     motion = smooth_motion(seed=3)
-    # the spine hangs from the root, and the hips are the sacroiliac: a frame of VMC moves the spine's bone instead
+    # the figure's spine hangs from the root, that of the humanoid from the hips, which turn with the sacroiliac
     motion.rotations[:, JOINT_INDEX["sacroiliac"]] = rotation.IDENTITY
     positions, _ = world_transforms(motion.figure, motion.root, motion.rotations)
     offsets, turns = bone_offsets(motion.figure), bone_rotations(motion.rotations)

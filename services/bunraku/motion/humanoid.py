@@ -3,8 +3,9 @@
 The mapping is that of the web client (`web/src/motion/humanoid.ts`). Hips is the sacroiliac, into which the root is
 merged; Spine is vl5, Head is skullbase, and the joints of arms and legs have one bone each. Bones between these
 (Chest, UpperChest, Neck, shoulders) are optional in avatars and do not rotate. They divide the figure's lengths, so
-that a tool that applies positions places every joint of the figure exactly. UpperChest coincides with Chest, because
-many avatars have no UpperChest.
+that a tool that applies positions places every joint of the figure exactly while the sacroiliac does not turn. When it
+turns, the rotations of all bones stay exact, and the trunk is moved a little, because it hangs from the hips here and
+from the root in the figure. UpperChest coincides with Chest, because many avatars have no UpperChest.
 
 Frame: the figure's (`motion.skeleton`): right-handed, metres, y up, facing z, x to the left. Bone names are those of
 Unity's HumanBodyBones.
