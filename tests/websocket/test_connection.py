@@ -192,7 +192,7 @@ async def test_limit_refills_with_the_clock() -> None:
 
 async def test_rest_of_a_segment_is_parsed_after_a_closing_message() -> None:
     transport, listener = FakeTransport(), RecordingListener()
-    connection = WebSocketConnection(transport, listener, set())
+    connection = WebSocketConnection(transport, listener, set(), lambda: 0)
     connection.data_received(client_frame(Opcode.TEXT, b"hello") + client_frame(Opcode.CLOSE))
     assert connection.is_closing
     connection.data_received(b"")
@@ -206,7 +206,7 @@ async def test_rest_of_a_segment_is_parsed_after_a_closing_message() -> None:
 )
 async def test_close_frame_is_answered_with_its_code(payload: bytes, code: int) -> None:
     transport = FakeTransport()
-    connection = WebSocketConnection(transport, RecordingListener(), set())
+    connection = WebSocketConnection(transport, RecordingListener(), set(), lambda: 0)
     connection.data_received(client_frame(Opcode.CLOSE, payload))
     assert transport.written == b"\x88\x02" + code.to_bytes(2, "big")
     assert transport.is_closed
