@@ -224,7 +224,7 @@ class WebSocketConnection(asyncio.Protocol):
         """Handle up to `FRAMES_PER_TURN` received frames. Return whether more may be left."""
         if self._transport.is_closing():
             return False
-        handled, ping = 0, None
+        handled, ping, is_interrupted = 0, None, False
         frames = self._parser.parse()
         try:
             for opcode, payload in frames:
@@ -245,12 +245,14 @@ class WebSocketConnection(asyncio.Protocol):
             self._reject(CloseConnection(POLICY_VIOLATION, "Too many messages", "messages arrive too fast; send fewer"))
         except CloseConnection as reason:
             self.close_with_problem(reason)
+            # a Close frame may follow, which ends the connection at once
+            is_interrupted = True
         finally:
             frames.close()
         if ping is not None and self.is_writable and self._close_timer is None:
             # one Pong for the most recent Ping (RFC 6455, section 5.5.3)
             self.write(encode_frame(ping, Opcode.PONG))
-        return handled == FRAMES_PER_TURN and self._parser.has_unparsed_data
+        return (is_interrupted or handled == FRAMES_PER_TURN) and self._parser.has_unparsed_data
 
     def _count_frame(self) -> None:
         if not self._frames.take(self.last_received_at * 1e-6):
