@@ -56,9 +56,11 @@ export class PlaybackController {
 
   /** Report a rejected token. */
   onUnauthorized({ title, detail, hint }: Pick<ProblemError, "title" | "detail" | "hint">): void {
+    const { page } = this.options;
     this.#accessDenied = true;
-    const text = hint ? translate("{detail}; {hint}.", { detail, hint }) : detail;
-    this.options.page.notice("access", title, text);
+    // A connection that was rejected for the same reason may have been reported before.
+    page.notice("dance", null);
+    page.notice("access", title, hint ? translate("{detail}; {hint}.", { detail, hint }) : detail);
   }
 
   togglePlaying(): void {

@@ -100,4 +100,17 @@ describeInBrowser("access with links", { server: "guarded" }, (fixture) => {
     await notice.getByText("A link is needed").waitFor();
     expect(await notice.innerText()).toContain("ask its host for a link");
   });
+
+  test("a rejected connection and a rejected request are reported once", async () => {
+    const page = await fixture.open("", {
+      before: (opened) =>
+        opened.route("**/v1/motions*", async (route) => {
+          await opened.locator(".notice").getByText("The session has ended").waitFor();
+          await route.continue();
+        }),
+    });
+    const notice = page.locator(".notice");
+    await notice.getByText("ask its host for a link").waitFor();
+    expect(await notice.locator("p").count()).toBe(1);
+  });
 });
