@@ -17,6 +17,7 @@ from bunraku.client.viewer_statistics import ViewerStatistics
 from bunraku.codec import motion_decoder
 from bunraku.codec.audio import AudioPacket, AudioTrack
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneTrack
@@ -28,8 +29,10 @@ from bunraku.playout.audio_store import AudioBlockStore
 from bunraku.playout.block_store import MotionBlockStore, Pose, SceneBlockStore
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
+from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.overlay_buffer import OverlayBuffer
 from bunraku.playout.track_set import TrackSet
+from bunraku.wire.live import Live
 from bunraku.wire.messages import (
     ChannelHeader,
     Choice,
@@ -80,6 +83,7 @@ class Viewer:
         self.motion: str | None = None
         self._tracks: TrackSet | None = None
         self._overlays = OverlayBuffer()
+        self._live: dict[int, LiveBuffer] = {}
         self._delay = PlayoutDelay()
         self._overlay_leads_ms: list[float] = []
         self._decode_s = 0.0
@@ -173,9 +177,10 @@ class Viewer:
         state, tracks = self.timeline_history.at(reference), self._tracks
         if state is None or tracks is None or state.motion != self.motion or performer >= len(tracks.performers):
             return None
-        store = tracks.performers[performer]
-        position = timeline.position_at(state, reference)
-        pose = store.pose_at(position, state.loop, state.duration) if store is not None else None
+        live, store = self._live.get(performer), tracks.performers[performer]
+        pose = live.pose_at(reference) if live is not None else None
+        if pose is None and store is not None:
+            pose = store.pose_at(timeline.position_at(state, reference), state.loop, state.duration)
         if pose is None:
             return None
         root, rotations = tracks.placements[performer].apply(*pose)
@@ -223,13 +228,12 @@ class Viewer:
             self._store_block(message)
         elif isinstance(message, Overlay):
             self.statistics.overlays += 1
-            local = self._local_clock()
-            late = self.clock.at(local) - message.due
-            if self.clock.is_synchronised:
-                self._overlay_leads_ms.append(-late / 1e3)
-                # its first frame continues from the last one of the previous message
-                self._delay.add_lateness(late + (len(message.earlier) + 1) * Overlay.FRAME_INTERVAL_US, local)
+            self._record_arrival(message.due, len(message.earlier) + 1)
             self._overlays.put(message)
+        elif isinstance(message, Live):
+            self.statistics.live_messages += 1
+            self._record_arrival(message.due, message.frames)
+            self._store_live(message)
         elif isinstance(message, Pong):
             self.clock.add_sample(message.sent, message.received, message.answered, self._local_clock())
             self._reporter.on_pong(message.sequence)
@@ -247,6 +251,26 @@ class Viewer:
             # the close frame that follows decides about reconnecting
             self._connection.close_reason = f"{message.title}: {message.detail}"
 
+    def _record_arrival(self, due: int, frames: int) -> None:
+        """Adapt the play-out delay to a message of `frames` frames, the last due at `due`."""
+        local = self._local_clock()
+        late = self.clock.at(local) - due
+        if self.clock.is_synchronised:
+            self._overlay_leads_ms.append(-late / 1e3)
+            # its first frame continues from the last one of the previous message
+            self._delay.add_lateness(late + frames * Overlay.FRAME_INTERVAL_US, local)
+
+    def _store_live(self, message: Live) -> None:
+        """Decode the poses of the performers that are described."""
+        performers = self._tracks.performers if self._tracks is not None else []
+        for performer, block in message.blocks.items():
+            store = performers[performer] if performer < len(performers) else None
+            if store is None:
+                continue
+            if performer not in self._live:
+                self._live[performer] = LiveBuffer(LiveTrack(store.track.skeleton))
+            self._live[performer].put(message.due, message.frames, block)
+
     def _on_description(self, description: Description) -> None:
         """Add the announced tracks; the motion must be decodable, other unknown tracks are skipped."""
         first = description.first or 0
@@ -262,6 +286,7 @@ class Viewer:
         except DamagedBlock as error:
             raise StreamEnded(str(error)) from None
         self.motion = description.motion
+        self._live.clear()
 
     def _store_block(self, data: Data) -> None:
         """Decode a block of a known track and store it."""

@@ -28,6 +28,7 @@ class ViewerStatistics:
     audio_blocks: int = 0
     audio_rate: int = -1
     overlays: int = 0
+    live_messages: int = 0
     reconnects: int = 0
     reason: str | None = None
     bytes: int = 0

@@ -29,12 +29,12 @@ SHRINK_TIME_CONSTANT_US = 10_000_000
 class PlayoutDelay:
     """Play-out delay of one viewer."""
 
-    def __init__(self) -> None:
+    def __init__(self, initial_us: float = 0.0) -> None:
         self._lateness: deque[float] = deque(maxlen=LATENESS_SAMPLES)
         # the delay in use was `_start` at local time `_started_at`, and approaches `_target`
-        self._start = 0.0
+        self._start = initial_us
         self._started_at = 0
-        self._target = 0.0
+        self._target = initial_us
 
     def add_lateness(self, lateness: float, local: int) -> None:
         """Add a message that arrived at local time `local`, `lateness` after it was needed (negative if before).

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import atan2, pi, sqrt
 
 import numpy as np
@@ -82,6 +82,22 @@ def pack_joints(rotations: Sequence[Quaternion]) -> tuple[int, ...]:
             scale = 2.0 / RADIANS_PER_UNIT
         numbers += (round(x * scale), round(y * scale), round(z * scale))
     return tuple(numbers)
+
+
+def pack_overlay(sequence: int, due: int, frames: Sequence[Mapping[int, Sequence[Quaternion]]]) -> bytes:
+    """Return the Overlay of the last of `frames` that control the same limbs as the very last one, due at `due`.
+
+    A frame has the rotations of three joints for each controlled limb.
+    """
+    limbs = frames[-1].keys()
+    packed: list[dict[int, tuple[int, ...]]] = []
+    for frame in reversed(frames):
+        if frame.keys() != limbs:
+            break
+        packed.append({limb: pack_joints(joints) for limb, joints in frame.items()})
+    if not limbs:
+        return Overlay(sequence, due, {}).pack()
+    return Overlay(sequence, due, packed[0], tuple(reversed(packed[1:]))).pack()
 
 
 def unpack_joints(numbers: tuple[int, ...]) -> Array:

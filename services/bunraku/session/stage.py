@@ -12,7 +12,7 @@ import asyncio
 import contextlib
 import secrets
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import msgpack
@@ -22,18 +22,23 @@ from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.bus import Bus, Subscription
+from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
-from bunraku.playout.overlay_buffer import pack_joints
+from bunraku.playout.block_store import Pose
+from bunraku.playout.overlay_buffer import pack_overlay
+from bunraku.playout.performance import SampleOutcome
 from bunraku.playout.session_log import SessionLog
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
+from bunraku.session.live_performers import LivePerformers
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.presence import PresencePublisher
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stall import EventLoopStallCompensation
 from bunraku.wire import messages
+from bunraku.wire.live import Sample
 from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Refusal, Release, TimelineState, Welcome
 from bunraku.wire.overlay import Overlay
 
@@ -88,11 +93,12 @@ class Stage:
         self._timelines.put(start.timeline)
         self.puppeteers = PuppeteerRoster()
         self.presence_publisher = PresencePublisher(self._send_presence, clock)
-        self._has_grants = asyncio.Event()
+        self._has_work = asyncio.Event()
         self._stall_compensation = EventLoopStallCompensation()
         self._sequence = 0
         self._phase_us = secrets.randbelow(FRAMES_PER_MESSAGE * FRAME_INTERVAL_US)
         self._last_overlay: bytes | None = None
+        self.live = LivePerformers()
         self.log = SessionLog()
         self.log.add_timeline(self.timeline)
         self._marionettes = Marionettes(_performer_figures(start.motion), solver=solver)
@@ -246,6 +252,14 @@ class Stage:
         elif isinstance(message, Input):
             self._receive_input(puppeteer, message, now)
 
+    def receive_sample(self, performer_id: str, sample: Sample) -> SampleOutcome | None:
+        """Apply a sample of a live performer; None if there is no such performer."""
+        performer = self.live.find(performer_id)
+        if performer is None:
+            return None
+        self._has_work.set()
+        return performer.receive(sample, self._clock())
+
     def _asks_under_another_name(self, puppeteer: Puppeteer, limb: int) -> bool:
         """Return whether another puppeteer of the same subject asks for a limb: each subject has one place."""
         asks = self._ownership.asks()
@@ -269,7 +283,7 @@ class Stage:
         if (puppeteer := self.puppeteers.get(puppeteer_id)) is not None:
             puppeteer.granted_epochs[grant.limb] = grant.epoch
             puppeteer.send(Grant(grant.limb, grant.epoch).pack())
-        self._has_grants.set()
+        self._has_work.set()
 
     def _grant_free_limbs(self, now: int) -> bool:
         """Grant free limbs to the puppeteers who asked for them; return whether requests have changed."""
@@ -302,13 +316,13 @@ class Stage:
 
     async def _run_ticks(self) -> None:
         while True:
-            await self._has_grants.wait()
-            self._has_grants.clear()
+            await self._has_work.wait()
+            self._has_work.clear()
             frame = self._frame_at(self._clock()) + 1
             await self._pose_cache.decode_blocks(self._frame_time_us(frame) + OVERLAY_LEAD_US)
             for before in (frame - 2, frame - 1):
                 due = self._frame_time_us(before) + OVERLAY_LEAD_US
-                if (poses := self._pose_cache.poses_at(due, FRAME_INTERVAL_US)) is not None:
+                if (poses := self._poses_at(due, self.live.poses_at(self._frame_time_us(before)))) is not None:
                     self._marionettes.observe_poses(poses, self._frame_time_us(before))
             frame_rate, lateness_us = FrameRateControl(), 0
             while self._publish_frames(
@@ -332,7 +346,7 @@ class Stage:
 
         For a limb that is still or moves slowly the last frame is enough, because viewers interpolate.
         """
-        return frame_rate.is_full_rate and self._marionettes.needs_full_rate
+        return frame_rate.is_full_rate and (self._marionettes.needs_full_rate or self.live.is_shown)
 
     def _frame_time_us(self, frame: int) -> int:
         """Return the clock time of a frame; the random phase spreads the stages of a process over time."""
@@ -355,19 +369,31 @@ class Stage:
         if self._grant_free_limbs(now) or lost:
             self.presence_publisher.publish()
         frame_overlays: list[OverlayJoints] = []
+        live_frames: list[dict[int, Pose]] = []
         for frame in frames:
             due = self._frame_time_us(frame) + OVERLAY_LEAD_US
-            poses = self._pose_cache.poses_at(due, FRAME_INTERVAL_US)
+            live_frames.append(self.live.poses_at(self._frame_time_us(frame)))
+            poses = self._poses_at(due, live_frames[-1])
             overlay = self._marionettes.compute_overlay(poses, self._frame_time_us(frame)) if poses else {}
             frame_overlays.append(overlay)
-        self._sequence += 1
         due = self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US
-        message = _pack_overlay(self._sequence, due, frame_overlays)
-        self._last_overlay = message if frame_overlays[-1] else None
-        self.log.add_overlay(due, message)
+        if (live := self.live.pack(due, live_frames)) is not None:
+            self._bus.publish(f"session.{self.id}.live", live)
+        if not self._ownership.is_at_rest or self._last_overlay is not None:
+            self._sequence += 1
+            message = pack_overlay(self._sequence, due, frame_overlays)
+            self._last_overlay = message if frame_overlays[-1] else None
+            self.log.add_overlay(due, message)
+            self._bus.publish(f"session.{self.id}.overlay", message)
         self._counters.tick_duration_s.observe(time.perf_counter() - begin_s)
-        self._bus.publish(f"session.{self.id}.overlay", message)
-        return not self._ownership.is_at_rest
+        return not self._ownership.is_at_rest or self.live.is_shown
+
+    def _poses_at(self, due: int, live: Mapping[int, Pose]) -> tuple[Array, ...] | None:
+        """Return the rotations (18, 4) of each performer at clock time `due`, those of live ones as given."""
+        poses = self._pose_cache.poses_at(due, FRAME_INTERVAL_US)
+        if not live or poses is None:
+            return poses
+        return tuple(live[number][1] if number in live else pose for number, pose in enumerate(poses))
 
 
 def load_bend_tables(motion: StoredMotion) -> None:
@@ -377,16 +403,3 @@ def load_bend_tables(motion: StoredMotion) -> None:
 
 def _performer_figures(motion: StoredMotion) -> list[Figure]:
     return [performer.track.figure for performer in motion.performers]
-
-
-def _pack_overlay(sequence: int, due: int, frame_overlays: list[OverlayJoints]) -> bytes:
-    """Pack the last frames that have the same limbs as the very last one."""
-    limbs = frame_overlays[-1].keys()
-    frames: list[dict[int, tuple[int, ...]]] = []
-    for overlay in reversed(frame_overlays):
-        if overlay.keys() != limbs:
-            break
-        frames.append({limb: pack_joints(joints) for limb, joints in overlay.items()})
-    if not limbs:
-        return Overlay(sequence, due, {}).pack()
-    return Overlay(sequence, due, frames[0], tuple(reversed(frames[1:]))).pack()

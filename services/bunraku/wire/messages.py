@@ -18,6 +18,7 @@ from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
 
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.limbs import MAX_LIMBS
+from bunraku.wire.live import Live, Sample
 from bunraku.wire.overlay import Overlay
 
 PROTOCOL_VERSION = 1
@@ -367,10 +368,10 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Notice | Choice | Ping | Edit | Report | Claim | Release | Alive | Ask | Input
+    | Notice | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Input | Sample
 )  # fmt: skip
 
-FIXED_MESSAGES = (Data, Overlay, Ping, Pong, Input)
+FIXED_MESSAGES = (Data, Overlay, Live, Ping, Pong, Input, Sample)
 """Messages of fixed layout."""
 MAP_MESSAGES = (
     ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Choice, Edit, Report,
