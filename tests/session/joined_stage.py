@@ -30,7 +30,7 @@ class StageMessages:
     def __init__(self, bus: MemoryBus) -> None:
         self.messages: list[object] = []
         self._more = asyncio.Event()
-        for subject in ("timeline", "presence", "overlay"):
+        for subject in ("timeline", "presence", "overlay", "live"):
             bus.subscribe(f"session.s.{subject}", self._receive)
 
     def _receive(self, message: bytes) -> None:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-
-import numpy as np
 
 from bunraku.codec.block_encoder import MAX_STEP, MIN_STEP, BlockEncoder
 from bunraku.codec.errors import DamagedBlock
@@ -25,6 +24,8 @@ _MAX_STEP_CHANGE = 4.0
 _STEPS_PER_OCTAVE = 16
 _CONTROL_GAIN = 0.25
 """Share of the deviation from the target that one block corrects: single blocks vary."""
+_TOLERANCE = 1.4
+"""Ratio to the target within which the step stays: a still pose keeps its block and does not tremble."""
 
 
 class LiveTrack:
@@ -72,6 +73,12 @@ class LiveEncoder:
         motion = Motion(track.figure, LIVE_FPS, root, rotations)
         encoded = BlockEncoder(track, motion, self._prior).encode_block(0, round(self._step))
         error_mm = float(encoded.errors_mm.mean())
-        change = _STEPS_PER_OCTAVE * _CONTROL_GAIN * float(np.log2(TARGET_ERROR_MM / max(error_mm, 1e-3)))
-        self._step = min(max(self._step + min(max(change, -_MAX_STEP_CHANGE), _MAX_STEP_CHANGE), MIN_STEP), MAX_STEP)
+        self._adapt_step(error_mm)
         return EncodedFrames(encoded.data, error_mm)
+
+    def _adapt_step(self, error_mm: float) -> None:
+        octaves = math.log2(TARGET_ERROR_MM / max(error_mm, 1e-3))
+        if abs(octaves) > math.log2(_TOLERANCE):
+            change = octaves * _STEPS_PER_OCTAVE * _CONTROL_GAIN
+            self._step += min(max(change, -_MAX_STEP_CHANGE), _MAX_STEP_CHANGE)
+            self._step = min(max(self._step, MIN_STEP), MAX_STEP)

@@ -18,6 +18,8 @@ from bunraku.motion.skeleton import JOINT_COUNT, Figure
 from bunraku.playout.block_store import Pose
 from bunraku.playout.delay import PlayoutDelay
 
+ON_TIME_QUANTILE = 0.99
+"""Share of the samples that must arrive before the poses that need them: a few in a hundred are lost on the way."""
 MAX_GAP_US = 250_000
 """Longest time between two samples that is interpolated."""
 HOLD_US = 500_000
@@ -30,8 +32,8 @@ MAX_AGE_US = 1_000_000
 MAX_AHEAD_US = 200_000
 """Samples from further in the future are ignored: the performer's clock is not synchronised."""
 MAX_SAMPLES = 512
-INITIAL_DELAY_US = 30_000
-"""Delay of the pose behind the clock until enough samples have arrived to know how late they are."""
+INITIAL_LATENESS_US = 13_000
+"""Assumed lateness of samples until enough have arrived to know it."""
 
 
 class SampleOutcome(Enum):
@@ -46,11 +48,11 @@ class SampleOutcome(Enum):
 class Performance:
     """Samples of one live performer, and the pose that they give."""
 
-    def __init__(self, figure: Figure) -> None:
-        """Until the first sample the figure is in its rest pose at the origin."""
+    def __init__(self, figure: Figure, fps: float) -> None:
+        """Expect about `fps` samples per second; until the first one the figure is in its rest pose at the origin."""
         self._times: list[int] = []
         self._samples: list[Pose] = []
-        self._delay = PlayoutDelay(INITIAL_DELAY_US)
+        self._delay = PlayoutDelay(1e6 / fps + INITIAL_LATENESS_US, ON_TIME_QUANTILE)
         self._rest_height = float(figure.offsets[0, 1])
         self._rest_rotations = np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
         self._shown: Pose = np.array([0.0, self._rest_height, 0.0]), self._rest_rotations
@@ -90,7 +92,8 @@ class Performance:
     def pose_at(self, capture: int) -> Pose:
         """Return the pose at capture time `capture`, which must not decrease from call to call."""
         after = bisect_right(self._times, capture)
-        self._shown = self._sampled_pose(after, capture) if self._is_covered(after, capture) else self._rest(capture)
+        is_covered = self._is_covered(after, capture)
+        self._shown = self._sampled_pose(after, capture) if is_covered else self._rest(after, capture)
         # one sample before the next capture time is needed
         expired = max(after - 1, 0)
         del self._times[:expired], self._samples[:expired]
@@ -122,13 +125,16 @@ class Performance:
             return pose
         return _blend(self._transition_from, pose, _ease(share))
 
-    def _rest(self, capture: int) -> Pose:
+    def _rest(self, after: int, capture: int) -> Pose:
         if not self._is_silent:
             self._is_silent = True
             self._silent_since = capture
-            self._transition_from = self._shown
+            # the last sample, unless the pose was still on its way to it
+            self._transition_from = self._shown if self._returning_since is not None else self._samples[after - 1]
         root, rotations = self._transition_from
         share = (capture - self._silent_since - HOLD_US) / FADE_US
+        if share <= 0.0:
+            return root, rotations
         rest = np.array([root[0], self._rest_height, root[2]]), self._rest_rotations
         return _blend((root, rotations), rest, _ease(share))
 

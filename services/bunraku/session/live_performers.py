@@ -20,9 +20,10 @@ from bunraku.wire.live import Live, Sample
 class LivePerformer:
     """One live performer, on the track of a motion that shows its figure at rest."""
 
-    def __init__(self, performer_id: str, track: MotionTrack) -> None:
+    def __init__(self, performer_id: str, track: MotionTrack, fps: float) -> None:
+        """Expect about `fps` samples per second."""
         self.id = performer_id
-        self.performance = Performance(track.figure)
+        self.performance = Performance(track.figure, fps)
         self.encoder = LiveEncoder(track.skeleton)
 
     def receive(self, sample: Sample, now: int) -> SampleOutcome:
