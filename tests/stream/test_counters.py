@@ -73,12 +73,12 @@ async def test_sent_and_skipped_overlays_are_counted() -> None:
     counters.count_writes(connection)
     viewer.open(connection)
     overlay = encode_frame(Overlay(1, 5, {}).pack())
-    viewer.send_overlay(overlay)
+    viewer.send_newest(overlay)
     assert (counters.overlays, counters.skipped_overlays) == (1, 0)
     transport.has_capacity = False
-    viewer.send_overlay(overlay)
+    viewer.send_newest(overlay)
     for _ in range(4):
-        viewer.send_overlay(overlay)
+        viewer.send_newest(overlay)
     # one is buffered in the process, one is queued, three were replaced
     assert (counters.overlays, counters.skipped_overlays) == (2, 3)
     transport.drain()

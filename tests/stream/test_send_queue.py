@@ -2,7 +2,9 @@ from __future__ import annotations
 
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, MAX_PENDING_PINGS, SendQueue
 from bunraku.websocket.frame import encode_frame, frame_payload
+from bunraku.wire.live import Live
 from bunraku.wire.messages import Ping, Pong, unpack
+from bunraku.wire.overlay import Overlay
 
 
 def test_queued_messages_are_taken_once_and_in_order() -> None:
@@ -10,14 +12,16 @@ def test_queued_messages_are_taken_once_and_in_order() -> None:
     assert not queue
     for name in (b"a", b"b"):
         assert queue.add_control(encode_frame(name))
-    queue.overlay = encode_frame(b"old")
-    queue.overlay = encode_frame(b"new")
+    old, new, live = Overlay(1, 1, {}).pack(), Overlay(2, 2, {4: (0,) * 9}).pack(), Live(1, 1, {}).pack()
+    assert not queue.has_newest
+    assert [queue.put_newest(encode_frame(message)) for message in (old, live, new, live)] == [False, False, True, True]
+    assert queue.has_newest
     assert queue
     assert queue.take_control() == [encode_frame(b"a"), encode_frame(b"b")]
     assert queue
-    assert queue.take_overlay() == encode_frame(b"new")
+    assert [queue.take_newest(), queue.take_newest()] == [encode_frame(new), encode_frame(live)]
     assert not queue
-    assert (queue.take_control(), queue.take_overlay(), queue.take_pongs()) == ([], None, [])
+    assert (queue.take_control(), queue.take_newest(), queue.take_pongs()) == ([], None, [])
 
 
 def test_full_queue_rejects_messages_until_taken() -> None:

@@ -79,7 +79,7 @@ async def test_queued_messages_leave_in_one_write_when_opened(motions: dict[str,
     viewer, transport = ViewerConnection(StreamContext.create(clock)), FakeTransport()
     viewer.set_timeline(timeline.start("one", 9_200_000, clock()), motions["one"])
     viewer.send_control(PRESENCE)
-    viewer.send_overlay(overlay_frame(3))
+    viewer.send_newest(overlay_frame(3))
     assert transport.sent == b""
     viewer.open(transport.open_connection(viewer))
     assert transport.writes == 1
@@ -103,15 +103,15 @@ async def test_new_motion_is_announced_before_its_blocks(motions: dict[str, Stor
 
 async def test_only_newest_overlay_is_queued(motions: dict[str, StoredMotion]) -> None:
     viewer, transport, _ = open_viewer(motions["one"])
-    viewer.send_overlay(overlay_frame(1))
+    viewer.send_newest(overlay_frame(1))
     transport.has_capacity = False
     for number in range(2, 100):
-        viewer.send_overlay(overlay_frame(number))
+        viewer.send_newest(overlay_frame(number))
     # one is buffered in the transport already
     assert transport.unsent == overlay_frame(2)
     transport.drain()
     assert [o.sequence for o in messages_of_type(Overlay, transport) if isinstance(o, Overlay)] == [1, 2, 99]
-    viewer.send_overlay(overlay_frame(100))
+    viewer.send_newest(overlay_frame(100))
     assert transport.sent.endswith(overlay_frame(100))
 
 
@@ -120,7 +120,7 @@ async def test_queued_messages_leave_in_order_of_priority(motions: dict[str, Sto
     transport.has_capacity = False
     viewer.send_control(PRESENCE)
     before = len(transport.messages)
-    viewer.send_overlay(overlay_frame(7))
+    viewer.send_newest(overlay_frame(7))
     viewer.send_control(PRESENCE)
     viewer.set_timeline(timeline.edit(state, clock(), position=8_000_000), motions["one"])
     viewer.on_message(Ping(1, 2).pack())

@@ -128,7 +128,7 @@ async def test_only_newest_overlays_are_sent_with_low_latency(motion: StoredMoti
     sent_at: dict[int, int] = {}
     for number in range(1, 600):
         simulation.advance_time(35_000)
-        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
+        simulation.viewer.send_newest(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
         sent_at[number] = simulation.at
     overlays = [
         (w, arrived, o)
@@ -162,7 +162,7 @@ async def test_no_choice_is_sent_while_link_is_slowing(motion: StoredMotion) -> 
                 True,
                 None,
             )
-        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
+        simulation.viewer.send_newest(encode_frame(Overlay(number, 5, LIMBS, (LIMBS,)).pack()))
         for _ in range(7):
             was_slowing = simulation.viewer._flow.is_slowing
             simulation.advance_time(5_000)
@@ -255,7 +255,7 @@ async def test_unconstrained_link_is_unchecked_until_congested(
     before = simulation.transport.reads
     for number in range(100):
         simulation.at += 33_000
-        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
+        simulation.viewer.send_newest(encode_frame(Overlay(number, 5, LIMBS).pack()))
     assert simulation.transport.reads == before
     assert len(simulation.messages_of_type(Overlay)) == 100
     assert simulation.viewer.accepts_direct_writes
@@ -264,13 +264,13 @@ async def test_unconstrained_link_is_unchecked_until_congested(
     simulation.transport.sent += bytes(2_000_000)
     simulation.viewer.tick()
     steady = simulation.viewer.accepts_direct_writes
-    simulation.viewer.send_overlay(encode_frame(Overlay(101, 5, LIMBS).pack()))
+    simulation.viewer.send_newest(encode_frame(Overlay(101, 5, LIMBS).pack()))
     assert len(simulation.messages_of_type(Overlay)) == 100
     simulation.advance_time(1_000_000)
     assert len(simulation.messages_of_type(Overlay)) == 101
     for number in range(102, 600):
         simulation.advance_time(33_000)
-        simulation.viewer.send_overlay(encode_frame(Overlay(number, 5, LIMBS).pack()))
+        simulation.viewer.send_newest(encode_frame(Overlay(number, 5, LIMBS).pack()))
     assert (steady, simulation.viewer.accepts_direct_writes) == (False, True)
     simulation.viewer.on_close()
 

@@ -2,8 +2,8 @@
 
 A viewer has no separate task. It acts when something is published for it, when it sends a message, when its
 connection becomes writable, and in its scheduler ticks (`bunraku.stream.tick_scheduler`). While the connection is not
-writable, control messages are queued up to a limit, and only the newest overlay is kept. A viewer whose queue is full
-is disconnected with a reason; one that is silent is sent a Ping, and disconnected if no answer arrives.
+writable, control messages are queued up to a limit, and only the newest overlay and live poses are kept. A viewer whose
+queue is full is disconnected with a reason; one that is silent is sent a Ping, and disconnected if no answer arrives.
 
 On an unlimited link (`bunraku.stream.flow_control`) everything is written at once. On other links control messages are
 written first; blocks and the newest overlay follow one by one while the link has capacity, so that its queue stays
@@ -33,6 +33,7 @@ from bunraku.websocket.frame import encode_frame, frame_payload
 from bunraku.websocket.heartbeat import Heartbeat
 from bunraku.websocket.subprotocol import INTERNAL_ERROR, POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.live import Live
 from bunraku.wire.messages import Data, Edit, Ping, Report, TimelineState, unpack
 from bunraku.wire.overlay import drop_earlier_frames
 
@@ -115,8 +116,8 @@ class ViewerConnection:
                 CloseConnection(TRY_AGAIN_LATER, "Too slow", f"{MAX_CONTROL_MESSAGES} messages are unsent; reconnect")
             )
 
-    def send_overlay(self, framed: bytes) -> None:
-        """Send the newest overlay, framed: at once if the link has capacity, else in place of an unsent one."""
+    def send_newest(self, framed: bytes) -> None:
+        """Send an Overlay or Live message, framed: at once if the link has capacity, else in place of an unsent one."""
         writable, flow = self.connection.is_writable, self._flow
         if writable and flow.state.skips_overlay_check:
             self.connection.write(framed)
@@ -128,8 +129,7 @@ class ViewerConnection:
                 self._invalidate_writable()
                 self._context.scheduler.schedule(self, 0)
         else:
-            self._context.counters.skipped_overlays += self._queue.overlay is not None
-            self._queue.overlay = framed
+            self._context.counters.skipped_overlays += self._queue.put_newest(framed)
             self._overlay_waited_at = self._context.clock()
             if writable and self._timer is None:
                 self._send_due(self._overlay_waited_at)
@@ -237,8 +237,8 @@ class ViewerConnection:
     def _send_unlimited(self, now: int) -> None:
         """Send everything that is due."""
         frames = self._take_priority_frames()
-        if (overlay := self._queue.take_overlay()) is not None:
-            frames.append(overlay)
+        while (newest := self._queue.take_newest()) is not None:
+            frames.append(newest)
             self._context.counters.overlays += 1
         connection, size = self.connection, 0
         while connection.is_writable and (packet := self._next_packet(now)) is not None:
@@ -285,12 +285,12 @@ class ViewerConnection:
         if may_announce and (choice := feed.take_choice()):
             # before the prefetch, which may take long
             self._write(choice)
-        elif (self._queue.overlay is None or is_constrained) and (packet := self._next_packet(now)) is not None:
+        elif (not self._queue.has_newest or is_constrained) and (packet := self._next_packet(now)) is not None:
             self._write(encode_frame(packet))
             flow.charge_block(len(packet))
             flow.uncork()
-        elif (overlay := self._queue.take_overlay()) is not None:
-            self._write(encode_frame(drop_earlier_frames(frame_payload(overlay))) if is_constrained else overlay)
+        elif (newest := self._queue.take_newest()) is not None:
+            self._write(encode_frame(_reduce(frame_payload(newest))) if is_constrained else newest)
             self._context.counters.overlays += 1
         elif choice := feed.take_choice():
             self._write(choice)
@@ -398,3 +398,8 @@ class ViewerConnection:
             return
         state = timeline.edit(state, now, playing=edit.playing, position=edit.position, loop=edit.loop)
         self.set_timeline(state, delivery.motion)
+
+
+def _reduce(message: bytes) -> bytes:
+    """Return an Overlay reduced to its last frame; the frames of a Live message are coded together."""
+    return message if message[0] == Live.TYPE else drop_earlier_frames(message)

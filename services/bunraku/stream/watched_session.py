@@ -95,6 +95,7 @@ class WatchedSession:
             source.bus.subscribe(f"{self._subject}.timeline", self._on_timeline),
             source.bus.subscribe(f"{self._subject}.presence", self._on_presence),
             source.bus.subscribe(f"{self._subject}.overlay", self._on_overlay),
+            source.bus.subscribe(f"{self._subject}.live", self._send_newest),
             source.bus.subscribe(f"{self._subject}.appear", self._on_session_takeover),
         ]
 
@@ -132,7 +133,7 @@ class WatchedSession:
         viewer.set_timeline(*self._current)
         viewer.send_control(self._presence)
         if self._overlay is not None:
-            viewer.send_overlay(self._overlay)
+            viewer.send_newest(self._overlay)
         self._viewers[viewer] = None
         viewer.group = self
         self._writable = None
@@ -255,9 +256,13 @@ class WatchedSession:
         self._publish_count(len(self._viewers))
 
     def _on_overlay(self, message: bytes) -> None:
-        framed = encode_frame(message)
         # sent to viewers that join later; an empty mask says that no limb is controlled
-        self._overlay = framed if message[1] else None
+        self._overlay = encode_frame(message) if message[1] else None
+        self._send_newest(message)
+
+    def _send_newest(self, message: bytes) -> None:
+        """Send an Overlay or Live message to all viewers."""
+        framed = encode_frame(message)
         writable = self._writable
         if writable is None:
             writable = self._writable = MulticastGroup(
@@ -265,7 +270,7 @@ class WatchedSession:
             )
             self._unwritable = [viewer for viewer in self._viewers if not viewer.accepts_direct_writes]
         for viewer in self._unwritable:
-            viewer.send_overlay(framed)
+            viewer.send_newest(framed)
         # before the addition reads the counter, as writes to single connections increment it too
         sent_bytes = writable.write(framed)
         self._context.counters.bytes += sent_bytes
