@@ -70,7 +70,7 @@ class Opened:
 async def opened() -> AsyncIterator[Opened]:
     await asyncio.to_thread(motion_decoder.warm_up)
     bus = MemoryBus()
-    motion = await stored_motion("one", 5)
+    motion = stored_motion("one", 5)
     state = timeline.start("one", motion.first_track.duration_us, clock())
     stage = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
     yield Opened(stage, motion, bus)
@@ -87,7 +87,7 @@ async def test_samples_are_published_and_due_after_the_lead_and_the_delay(opened
     dues = [message.due for message in lives]
     assert all(gap % Live.FRAME_INTERVAL_US == 0 for gap in np.diff(dues))
     for message in lives:
-        opened.buffer.put(message.due, message.frames, message.blocks[0])
+        opened.buffer.put(message.due, message.frames, message.blocks[0].data)
     # the delay changes slowly: the pose due now is that of one lead and about one delay before
     lag = OVERLAY_LEAD_US + performance.performance.delay_us(clock())
     pose = opened.buffer.pose_at(dues[-1])
@@ -136,7 +136,7 @@ async def test_silent_performer_rests_and_then_sends_nothing(opened: Opened) -> 
     assert isinstance(last_shown, Live)
     first_shown = next(m for m in messages if isinstance(m, Live))
     assert last_shown.due - first_shown.due >= HOLD_US + FADE_US - 100_000
-    opened.buffer.put(last_shown.due, last_shown.frames, last_shown.blocks[0])
+    opened.buffer.put(last_shown.due, last_shown.frames, last_shown.blocks[0].data)
     pose = opened.buffer.pose_at(last_shown.due)
     assert pose is not None
     assert _angle(pose[1], np.zeros((JOINT_COUNT, 3))) < 0.03

@@ -13,9 +13,9 @@ def test_queued_messages_are_taken_once_and_in_order() -> None:
     for name in (b"a", b"b"):
         assert queue.add_control(encode_frame(name))
     old, new, live = Overlay(1, 1, {}).pack(), Overlay(2, 2, {4: (0,) * 9}).pack(), Live(1, 1, {}).pack()
-    assert not queue.has_newest
+    had_newest = queue.has_newest
     assert [queue.put_newest(encode_frame(message)) for message in (old, live, new, live)] == [False, False, True, True]
-    assert queue.has_newest
+    assert (had_newest, queue.has_newest) == (False, True)
     assert queue
     assert queue.take_control() == [encode_frame(b"a"), encode_frame(b"b")]
     assert queue

@@ -4,13 +4,16 @@ from hypothesis import strategies as st
 
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.limbs import MAX_PERFORMERS
-from bunraku.wire.live import MAX_LIVE_FRAMES, Live, Sample
+from bunraku.wire.live import AGE_UNIT_US, MAX_LIVE_FRAMES, Live, LiveBlock, Sample
 
 lives = st.builds(
     Live,
     due=st.integers(0, 2**53 - 1),
     frames=st.integers(1, MAX_LIVE_FRAMES),
-    blocks=st.dictionaries(st.integers(0, MAX_PERFORMERS - 1), st.binary(max_size=300)),
+    blocks=st.dictionaries(
+        st.integers(0, MAX_PERFORMERS - 1),
+        st.builds(LiveBlock, st.integers(0, 255).map(lambda age: age * AGE_UNIT_US), st.binary(max_size=300)),
+    ),
 )
 floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
 samples = st.builds(
@@ -26,7 +29,7 @@ samples = st.builds(
 def test_live_round_trip(live: Live) -> None:
     packed = live.pack()
     assert Live.unpack(packed) == Live(live.due, live.frames, dict(sorted(live.blocks.items())))
-    assert len(packed) <= 10 + sum(2 + len(block) for block in live.blocks.values())
+    assert len(packed) <= 10 + sum(3 + len(block.data) for block in live.blocks.values())
 
 
 @given(lives, st.data())
@@ -49,7 +52,7 @@ def test_any_bytes_are_a_live_message_or_rejected(data: bytes) -> None:
 
 def test_bytes_after_the_last_block_are_rejected() -> None:
     with pytest.raises(MalformedMessage, match="1 bytes after its last block"):
-        Live.unpack(Live(0, 2, {0: b"ab"}).pack() + b"\0")
+        Live.unpack(Live(0, 2, {0: LiveBlock(0, b"ab")}).pack() + b"\0")
 
 
 @given(samples)

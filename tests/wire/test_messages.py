@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from bunraku.wire import messages
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.limbs import MAX_LIMBS
+from bunraku.wire.live import Sample
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -197,6 +198,6 @@ def test_lowest_overlay_number_is_accepted() -> None:
 def test_types_are_unique_and_client_types_start_at_64() -> None:
     types = [kind.TYPE for kind in messages.Message.__args__]
     assert len(set(types)) == len(types)
-    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input}
+    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input, Sample}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client
     assert {*messages.FIXED_MESSAGES, *messages.MAP_MESSAGES} == set(messages.Message.__args__)

@@ -269,7 +269,7 @@ class Viewer:
                 continue
             if performer not in self._live:
                 self._live[performer] = LiveBuffer(LiveTrack(store.track.skeleton))
-            self._live[performer].put(message.due, message.frames, block)
+            self._live[performer].put(message.due, message.frames, block.data)
 
     def _on_description(self, description: Description) -> None:
         """Add the announced tracks; the motion must be decodable, other unknown tracks are skipped."""

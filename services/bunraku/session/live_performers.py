@@ -14,7 +14,7 @@ from bunraku.motion.skeleton import JOINT_COUNT
 from bunraku.playout.block_store import Pose
 from bunraku.playout.overlay_buffer import RADIANS_PER_UNIT
 from bunraku.playout.performance import Performance, SampleOutcome
-from bunraku.wire.live import Live, Sample
+from bunraku.wire.live import Live, LiveBlock, Sample
 
 
 class LivePerformer:
@@ -24,7 +24,12 @@ class LivePerformer:
         """Expect about `fps` samples per second."""
         self.id = performer_id
         self.performance = Performance(track.figure, fps)
-        self.encoder = LiveEncoder(track.skeleton)
+        self._encoder = LiveEncoder(track.skeleton)
+
+    def encode(self, poses: Sequence[Pose], due: int, frame_time: int) -> LiveBlock:
+        """Return the block of the poses of consecutive frames; the last is that of clock time `frame_time`."""
+        age_us = due - frame_time + self.performance.delay_us(frame_time)
+        return LiveBlock(age_us, self._encoder.encode(*_stack(poses)).data)
 
     def receive(self, sample: Sample, now: int) -> SampleOutcome:
         """Add a sample that arrived at `now`."""
@@ -71,17 +76,19 @@ class LivePerformers:
                 poses[number] = pose
         return poses
 
-    def pack(self, due: int, frames: Sequence[dict[int, Pose]]) -> bytes | None:
-        """Return the Live message of some frames, the last due at `due`; None if nobody is, or was, shown.
+    def pack(self, due: int, frame_time: int, frames: Sequence[dict[int, Pose]]) -> bytes | None:
+        """Return the Live message of some frames, the last of clock time `frame_time` and due at `due`.
 
-        Performers that are not in all frames are shown from the next message on.
+        None if nobody is, or was, shown.
+
+        Performers who are not in all frames are shown from the next message on.
         """
         shown = set.intersection(*(set(frame) for frame in frames))
         if not shown and not self._was_shown:
             return None
         self._was_shown = bool(shown)
         blocks = {
-            number: self._performers[number].encoder.encode(*_stack([frame[number] for frame in frames])).data
+            number: self._performers[number].encode([frame[number] for frame in frames], due, frame_time)
             for number in sorted(shown)
         }
         return Live(due, len(frames), blocks).pack()

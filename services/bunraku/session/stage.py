@@ -377,7 +377,7 @@ class Stage:
             overlay = self._marionettes.compute_overlay(poses, self._frame_time_us(frame)) if poses else {}
             frame_overlays.append(overlay)
         due = self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US
-        if (live := self.live.pack(due, live_frames)) is not None:
+        if (live := self.live.pack(due, self._frame_time_us(frames[-1]), live_frames)) is not None:
             self._bus.publish(f"session.{self.id}.live", live)
         if not self._ownership.is_at_rest or self._last_overlay is not None:
             self._sequence += 1

@@ -17,31 +17,43 @@ MAX_LIVE_FRAMES = 16
 MAX_LIVE_BLOCK_BYTES = (1 << 14) - 1
 """Largest block of a performer: two bytes of LEB128."""
 SAMPLE_JOINTS = 18
+AGE_UNIT_US = 4_000
+"""Unit in which the age of poses is sent."""
+MAX_AGE_US = 255 * AGE_UNIT_US
 _HEADER = struct.Struct("<BBQ")
+
+
+@dataclass(frozen=True, slots=True)
+class LiveBlock:
+    """Block of the frames of one performer (proto/codec.md, 2.16)."""
+
+    age_us: int
+    """Time from the capture of a pose until it is due, sent in units of `AGE_UNIT_US`, at most `MAX_AGE_US`."""
+    data: bytes
 
 
 @dataclass(frozen=True, slots=True)
 class Live:
     """Whole poses of live performers in `frames` frames, the last at clock time `due`.
 
-    `blocks` maps a performer to a block of its frames (proto/codec.md, 2.16). No message depends on another, so that
-    any may be lost or skipped. A message without blocks ends the performances.
+    `blocks` maps a performer to a block of its frames. No message depends on another, so that any may be lost or
+    skipped. A message without blocks says that no performer is live any more.
     """
 
     TYPE: ClassVar[int] = 15
     FRAME_INTERVAL_US: ClassVar[int] = Overlay.FRAME_INTERVAL_US
     due: int
     frames: int
-    blocks: dict[int, bytes]
+    blocks: dict[int, LiveBlock]
 
     def pack(self) -> bytes:
-        """Encode the message: 10 bytes, and 1 or 2 bytes and the block of each performer."""
+        """Encode the message: 10 bytes, and 2 or 3 bytes and the block of each performer."""
         mask = sum(1 << performer for performer in self.blocks)
         parts = [_HEADER.pack(self.TYPE, self.frames - 1 << 4 | mask, self.due)]
         for performer in sorted(self.blocks):
             block = self.blocks[performer]
-            size = len(block)
-            parts += (bytes([size] if size < 128 else [size & 127 | 128, size >> 7]), block)
+            age, size = min(round(block.age_us / AGE_UNIT_US), 255), len(block.data)
+            parts += (bytes([age, size] if size < 128 else [age, size & 127 | 128, size >> 7]), block.data)
         return b"".join(parts)
 
     @classmethod
@@ -84,9 +96,11 @@ class Sample:
         return cls(sequence, sampled, (x, y, z), tuple(rotations))
 
 
-def _split_blocks(data: bytes, count: int) -> Iterator[bytes]:
+def _split_blocks(data: bytes, count: int) -> Iterator[LiveBlock]:
     at = _HEADER.size
     for _ in range(count):
+        age = data[at] if at < len(data) else 0
+        at += 1
         size, used = 0, 0
         while used < 2 and at + used < len(data):
             size |= (data[at + used] & 127) << 7 * used
@@ -98,7 +112,7 @@ def _split_blocks(data: bytes, count: int) -> Iterator[bytes]:
         at += used
         if at + size > len(data):
             raise MalformedMessage(f"Live has a block of {size} bytes, of which {len(data) - at} are there")
-        yield data[at : at + size]
+        yield LiveBlock(age * AGE_UNIT_US, data[at : at + size])
         at += size
     if at != len(data):
         raise MalformedMessage(f"Live has {len(data) - at} bytes after its last block")
