@@ -15,6 +15,7 @@ from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
+from bunraku.session.cast import Cast
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
@@ -37,10 +38,10 @@ class FakeStageOwner:
         self.input_scheduler = InputScheduler(TURN_US)
         self.ended: list[str] = []
 
-    async def load_motion(self, motion: str) -> StoredMotion:
-        raise ProblemError(404, "No such motion", motion)
+    async def load_cast(self, cast: Cast) -> StoredMotion:
+        raise ProblemError(404, "No such motion", cast.motion)
 
-    async def save_record(self, stage: Stage, state: TimelineState) -> None:
+    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:  # noqa: ARG002
         self.saved.append(state.pack())
         self.shown.append(stage.timeline.pack())
         if self.fails:

@@ -17,7 +17,7 @@ import msgpack
 from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
 
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import MAX_LIMBS
+from bunraku.wire.limbs import MAX_LIMBS, MAX_PERFORMERS
 from bunraku.wire.live import Live, Sample
 from bunraku.wire.overlay import Overlay
 
@@ -70,6 +70,25 @@ PuppeteerEntries = Annotated[
                 "required": ["id", "name", "colour"],
             },
             "description": "Puppeteers in the order of joining.",
+        }
+    ),
+]
+LiveEntries = Annotated[
+    list[dict[str, Any]],
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {
+                "title": "LivePresence",
+                "type": "object",
+                "properties": {
+                    "performer": {"type": "integer", "minimum": 0, "maximum": MAX_PERFORMERS - 1},
+                    "id": {"type": "string"},
+                    "name": {"type": "string"},
+                },
+                "required": ["performer", "id", "name"],
+            },
+            "minItems": 1,
         }
     ),
 ]
@@ -127,10 +146,10 @@ class TimelineState(_MapMessage):
 
 @dataclass(frozen=True, slots=True)
 class Presence(_MapMessage):
-    """Viewers, puppeteers, holders of the limbs and pending requests for held limbs.
+    """Viewers, puppeteers, holders of the limbs, pending requests for held limbs, and live performers.
 
     `limbs` has an id or None for each limb. `asks` has a list of ids for each limb, in the order of the requests; if it
-    is empty it is replaced by an empty list for each limb.
+    is empty it is replaced by an empty list for each limb. `live` is None if no performer is live.
     """
 
     TYPE = 6
@@ -140,6 +159,9 @@ class Presence(_MapMessage):
     asks: Annotated[
         list[list[Text]], Field(description="Per limb the ids that request it, oldest first; absent: none.")
     ] = field(default_factory=list)
+    live: Annotated[
+        LiveEntries | None, Field(description="Live performers of the motion, by number; absent: none.")
+    ] = None
 
     def __post_init__(self) -> None:
         if not self.asks:
