@@ -9,6 +9,7 @@ from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter
 
+from bunraku.wire.live import Live
 from bunraku.wire.messages import (
     FIXED_MESSAGES,
     MAP_MESSAGES,
@@ -42,8 +43,8 @@ CHANNELS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "/v1/sessions/{id}/stream",
         "One viewer of a session.",
         (
-            *("ChannelHeader", "Description", "TimelineState", "Presence", "Data", "Overlay", "Choice", "Pong"),
-            *("Problem", "Ping", "Report"),
+            *("ChannelHeader", "Description", "TimelineState", "Presence", "Data", "Overlay", "Live", "Choice"),
+            *("Pong", "Problem", "Ping", "Report"),
         ),
     ),
     "sessionControl": (
@@ -54,10 +55,15 @@ CHANNELS: dict[str, tuple[str, str, tuple[str, ...]]] = {
             *("Ping", "Claim", "Release", "Alive", "Input", "Ask"),
         ),
     ),
+    "performerInput": (
+        "/v1/performers/{id}/input",
+        "One live performer.",
+        ("Pong", "Problem", "Ping", "Sample"),
+    ),
 }
 """Address, summary and messages of each channel, in the order in which they usually appear."""
 
-_STRUCT_TYPES = {"B": ("u8", 1), "H": ("u16", 2), "I": ("u32", 4), "Q": ("u64", 8), "f": ("f32", 4)}
+_STRUCT_TYPES = {"B": ("u8", 1), "H": ("u16", 2), "I": ("u32", 4), "Q": ("u64", 8), "f": ("f32", 4), "h": ("i16", 2)}
 _SPECIAL_LAYOUTS: dict[type, list[dict[str, Any]]] = {
     Data: [
         {"offset": 0, "type": "u8", "name": "type"},
@@ -74,6 +80,16 @@ _SPECIAL_LAYOUTS: dict[type, list[dict[str, Any]]] = {
         {"offset": 4, "type": "u64", "name": "due"},
         {"offset": 12, "type": "u16", "name": "limb mask (type 14 only)"},
         {"type": "i16[9] per frame and limb", "name": "rotation vectors in pi/32767"},
+    ],
+    Live: [
+        {"offset": 0, "type": "u8", "name": "type"},
+        {"offset": 1, "type": "u4", "name": "frames less one", "bits": "7-4"},
+        {"offset": 1, "type": "u4", "name": "performer mask", "bits": "3-0"},
+        {"offset": 2, "type": "u64", "name": "due"},
+        {
+            "type": "per performer: u8, LEB128 of 1 or 2 bytes, bytes",
+            "name": "age in units of 4,000 us, size of the block, block",
+        },
     ],
 }
 
@@ -165,7 +181,7 @@ def make_document() -> dict[str, Any]:
         channels[name] = {
             "address": address,
             "summary": summary,
-            "parameters": {"id": {"description": "Id of the motion or session."}},
+            "parameters": {"id": {"description": "Id of the motion, session or performer."}},
             "messages": {message: {"$ref": f"#/components/messages/{message}"} for message in messages},
         }
         for action, is_client in (("send", False), ("receive", True)):

@@ -13,6 +13,7 @@ from tests.vectors import (
     audio,
     blocks,
     controlled_limb,
+    live,
     messages,
     one_euro,
     playback,
@@ -30,6 +31,7 @@ TYPESCRIPT_FILE = ROOT / "services" / "web" / "src" / "wire" / "messages.ts"
 GENERATORS: dict[str, Callable[[], Any]] = {
     "audio.json": audio.make_vectors,
     "blocks.json": blocks.make_vectors,
+    "live.json": live.make_vectors,
     "messages.json": messages.make_vectors,
     "one_euro.json": one_euro.make_vectors,
     "playback.json": playback.make_vectors,

@@ -13,6 +13,7 @@ from bunraku.codec.motion_track import MOTION_CODEC
 from bunraku.codec.scene import SCENE_CODEC
 from bunraku.codec.skeleton_description import SkeletonDescription, snap_to_grid
 from bunraku.motion.skeleton import standard_figure
+from bunraku.wire.live import MAX_AGE_US, Live, LiveBlock, Sample
 from bunraku.wire.messages import (
     Alive,
     Ask,
@@ -44,6 +45,8 @@ NOW_US = 1_774_000_000_123_456
 
 def to_json(value: Any) -> Any:
     """Return a value for JSON; bytes become {"base64": text}."""
+    if dataclasses.is_dataclass(value):
+        return {f.name: to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, bytes):
         return {"base64": to_base64(value)}
     if isinstance(value, dict):
@@ -141,8 +144,20 @@ def make_vectors() -> dict[str, Any]:
         Choice(4, "best"),
         Input(2, Input.VELOCITY, 9, 13, NOW_US, (-1.0, 0.0, 0.0)),
         Description("k3v9q", _complete_tracks()),
+        Live(NOW_US, 2, {0: LiveBlock(80_000, b"\x01block"), 3: LiveBlock(MAX_AGE_US, bytes(range(200)))}),
+        Live(NOW_US, 1, {2: LiveBlock(0, b"")}),
+        Live(NOW_US, 16, {}),
+        Sample(4_000_000_000, NOW_US, (0.5, 0.875, -1.25), (*range(-26, 26), -32_767, 32_767)),
+        Presence(
+            2,
+            [],
+            ["a1", *[None] * 7],
+            live=[{"performer": 0, "id": "p7", "name": "Aiko あ"}, {"performer": 1, "id": "p8", "name": "Ben"}],
+        ),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
+    live = Live(NOW_US, 2, {0: LiveBlock(8_000, b"ab"), 1: LiveBlock(4_000, b"c")}).pack()
+    sample = Sample(1, NOW_US, (0.0, 0.875, 0.0), (0,) * 54).pack()
     invalid = {
         "empty": b"",
         "limb past the last": Claim(0).pack()[:-1] + b"\x10",
@@ -159,6 +174,18 @@ def make_vectors() -> dict[str, Any]:
         "overlay of several shorter than its mask": bytes([14, 0]) + bytes(10) + b"\x10\x80" + bytes(18),
         "data without an index": bytes([3, 0]),
         "data with an index too long": bytes([3, 0, 128, 128, 128, 1]),
+        "live shorter than its header": live[:9],
+        "live without the age of a block": live[:10],
+        "live without the size of a block": live[:11],
+        "live with a size that does not end": live[:10] + b"\2\x80",
+        "live with a size of three bytes": live[:10] + b"\2\x82\x80\0ab",
+        "live shorter than its blocks": live[:-1],
+        "live without its second block": live[:14],
+        "live with bytes after its last block": live + b"\0",
+        "sample too short": sample[:-1],
+        "sample too long": sample + b"\0",
+        "sample with a position that is not a number": sample[:16] + b"\x00\x00\xc0\x7f" + sample[20:],
+        "sample with an infinite position": sample[:24] + b"\x00\x00\x80\xff" + sample[28:],
         "pong too long": Pong(1, 2, 3, 4).pack() + b"\0",
         "bytes after the map": Claim(0).pack() + b"\0",
         "nil in place of a limb": bytes([67]) + msgpack.packb({"limb": None}),
@@ -177,6 +204,15 @@ def make_vectors() -> dict[str, Any]:
         "an unknown key": (Claim(2), bytes([67]) + msgpack.packb({"limb": 2, "later": 1})),
         "the last of two equal keys": (Claim(2), bytes([67, 0x82]) + b"\xa4limb\x01\xa4limb\x02"),
     }
+    one_byte = Live(NOW_US, 1, {1: LiveBlock(4_000, b"ab")})
+    tolerated["a size of a live block in more bytes than needed"] = (
+        one_byte,
+        one_byte.pack()[:11] + b"\x82\0ab",
+    )
+    tolerated["reserved bytes of a sample that are not zero"] = (
+        Sample.unpack(sample),
+        sample[:1] + b"\1\2\3" + sample[4:],
+    )
     alone = Presence(3, [], ["a1", None, None, None])
     older = bytes([6]) + msgpack.packb({"viewers": 3, "puppeteers": [], "limbs": alone.limbs})
     return {

@@ -73,6 +73,7 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
         puppeteers=st.lists(st.dictionaries(TEXT, TEXT), max_size=3),
         limbs=st.lists(st.none() | TEXT, min_size=4, max_size=4),
         asks=st.just([]) | st.lists(st.lists(TEXT, max_size=3), min_size=4, max_size=4),
+        live=st.none() | st.lists(st.dictionaries(TEXT, TEXT), min_size=1, max_size=4),
     ),
     st.builds(Ping, sequence=U32, sent=TIME),
     st.builds(Pong, sequence=U32, sent=TIME, received=TIME, answered=TIME),

@@ -60,19 +60,27 @@ export class PerformerViewSet {
   poseAt(performer: number, timeline: TimelineState, clock: number, nowMs: number): Pose | null {
     const view = this.all[performer];
     if (!view) return null;
-    const position = positionAt(timeline, clock);
-    const hasBlock = view.seek(position, timeline.loop, timeline.duration);
-    if (performer === 0) {
-      const index = view.store.track.blockAt(position);
-      if (hasBlock) this.onBlockShown(view.store.levels[index], nowMs);
-      else if (timeline.playing && view.hasPose) this.onBlockMissing(index);
+    if (view.seekLive(clock)) {
+      if (performer === 0) this.onPoseShown(nowMs);
+    } else {
+      const position = positionAt(timeline, clock);
+      const hasBlock = view.seek(position, timeline.loop, timeline.duration);
+      if (performer === 0) {
+        const index = view.store.track.blockAt(position);
+        if (hasBlock) this.onBlockShown(view.store.levels[index], nowMs);
+        else if (timeline.playing && view.hasPose) this.onBlockMissing(index);
+      }
     }
     return view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
   }
 
-  private onBlockShown(level: number, nowMs: number): void {
+  private onPoseShown(nowMs: number): void {
     this.firstPoseMs ??= nowMs;
     this.missingBlock = -1;
+  }
+
+  private onBlockShown(level: number, nowMs: number): void {
+    this.onPoseShown(nowMs);
     this.level = level;
   }
 

@@ -1,9 +1,11 @@
-/** One performer as a viewer shows it: motion, overlays, and placement on the stage. */
+/** One performer as a viewer shows it: motion or live poses, overlays, and placement on the stage. */
 
 import { applyPlacement, type Placement, type StagedPerformer } from "../motion/placement";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
+import { LiveBuffer } from "../playout/live-buffer";
 import type { OverlayBuffer } from "../playout/overlay-buffer";
+import type { LiveBlock } from "../wire/live";
 import type { PredictionFrame } from "./predicted-limb";
 import type { SolverLoader } from "./solver-loader";
 
@@ -29,6 +31,8 @@ export class PerformerView implements StagedPerformer {
   hasPose = false;
   private readonly motionPose = restPose();
   private readonly mergedPose = restPose();
+  /** Live poses, null before the first. */
+  private live: LiveBuffer | null = null;
 
   /**
    * @param number number of the performer
@@ -56,6 +60,23 @@ export class PerformerView implements StagedPerformer {
   /** Load the solver, unless it is loaded. */
   loadSolver(): void {
     this.solverLoader.load();
+  }
+
+  /**
+   * Add the live poses of a block of `frames` frames, the last due at `due`.
+   *
+   * @throws DamagedBlock
+   */
+  putLive(due: number, frames: number, block: LiveBlock): void {
+    this.live ??= new LiveBuffer(this.store.track);
+    this.live.put(due, frames, block);
+  }
+
+  /** Move to the live pose at presented clock time `clock`. Return false if there is none. */
+  seekLive(clock: number): boolean {
+    if (!this.live?.poseAt(clock, this.motionPose)) return false;
+    if (!this.hasPose) this.loadSolver();
+    return (this.hasPose = true);
   }
 
   /**

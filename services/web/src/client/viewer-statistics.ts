@@ -5,6 +5,7 @@ import type { ReferenceClock } from "../playout/clock";
 import type { PlayoutDelay } from "../playout/delay";
 import type { Choice, Report } from "../wire/messages";
 import { BitrateMeter } from "./bitrate-meter";
+import { LiveLatency } from "./live-latency";
 import type { PerformerViewSet } from "./performer-view-set";
 import { describeStatus } from "./viewer-status";
 
@@ -20,10 +21,12 @@ export interface ViewerStatistics {
   clockOffsetMs: number | null;
   /** Maximum error of the clock estimate. */
   clockErrorMs: number | null;
-  /** Mean lateness of overlays; negative if they arrive before they are due. */
+  /** Mean lateness of overlays and live poses; negative if they arrive before they are due. */
   latencyMs: number | null;
-  /** Delay of the stage behind the reference clock, so that overlays arrive before they are due. */
+  /** Delay of the stage behind the reference clock, so that overlays and live poses arrive before they are due. */
   playoutDelayMs: number;
+  /** Time from the capture of a live performer's pose until it is shown; null if nobody is live. */
+  liveLatencyMs: number | null;
   /** Time from the creation of the viewer to its first pose. */
   firstPoseMs: number | null;
   /** Number of missing blocks while playing. */
@@ -52,6 +55,7 @@ export interface StatisticsSources {
 /** Collector of a viewer's measurements. Durations are moving averages in milliseconds. */
 export class StatisticsCollector {
   readonly bitrate = new BitrateMeter();
+  readonly liveLatency = new LiveLatency();
   /** Number of messages and blocks that could not be decoded. */
   damagedCount = 0;
   /** Last choice of the server. */
@@ -64,7 +68,7 @@ export class StatisticsCollector {
 
   constructor(private readonly sources: StatisticsSources) {}
 
-  /** Add the lateness of an overlay, negative if it arrived before it was due. */
+  /** Add the lateness of an overlay or of live poses, negative if they arrived before they were due. */
   addLateness(ms: number): void {
     this.latencyMs = this.latencyMs === null ? ms : updateMean(this.latencyMs, ms);
   }
@@ -84,6 +88,8 @@ export class StatisticsCollector {
     const { clock, delay, performerViews, startedAt, isPinned, translator } = this.sources;
     const { firstPoseMs, level, gaps, state: playback } = performerViews;
     const { damagedCount, choice, closeReason } = this;
+    const playoutDelayMs = delay.at(nowMs * 1000) / 1000;
+    const liveAgeMs = this.liveLatency.ageMs(nowMs);
     const isSynchronised = Number.isFinite(clock.errorBound);
     return {
       rate: level < 0 ? -1 : (choice?.rate ?? level),
@@ -92,7 +98,8 @@ export class StatisticsCollector {
       clockOffsetMs: isSynchronised ? clock.offset / 1000 - performance.timeOrigin : null,
       clockErrorMs: isSynchronised ? clock.errorBound / 1000 : null,
       latencyMs: this.latencyMs,
-      playoutDelayMs: delay.at(nowMs * 1000) / 1000,
+      playoutDelayMs,
+      liveLatencyMs: liveAgeMs === null ? null : liveAgeMs + playoutDelayMs,
       firstPoseMs: firstPoseMs === null ? null : firstPoseMs - startedAt,
       gaps,
       reason: describeStatus({ closeReason, damagedCount, playback, choice, isPinned }, translator),

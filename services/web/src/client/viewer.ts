@@ -13,6 +13,7 @@ import { type LightState, lightStates } from "../playout/light-state";
 import { type LeaderTime, PresentationClock } from "../playout/presentation-clock";
 import { positionAt, TimelineHistory } from "../playout/timeline";
 import { TrackSet } from "../playout/track-set";
+import type { Live } from "../wire/live";
 import type { Data, Description, Edit, Message, Presence, TimelineState } from "../wire/messages";
 import { OVERLAY_FRAME_INTERVAL_US, type Overlay } from "../wire/overlay";
 import { pageAccess } from "./access";
@@ -177,8 +178,8 @@ export class Viewer extends EventTarget {
   }
 
   /**
-   * Return the pose of a performer at local `nowMs`, placed on the stage: the motion, the overlays of controlled limbs,
-   * and the predictions of this page's own. Null before the first pose; while a block is missing the last pose is kept.
+   * Return the pose of a performer at local `nowMs`, placed on the stage: the motion or the live pose, the overlays of
+   * controlled limbs, and the predictions of this page's own. Null before the first pose; while a block is missing the last pose is kept.
    * The next call for this performer reuses the storage.
    */
   poseAt(nowMs: number, performer = 0): Pose | null {
@@ -302,6 +303,9 @@ export class Viewer extends EventTarget {
       case "Overlay":
         this.onOverlay(message, now);
         break;
+      case "Live":
+        this.onLive(message, now);
+        break;
       case "Presence":
         this.presence = message;
         this.dispatch("presence");
@@ -336,6 +340,7 @@ export class Viewer extends EventTarget {
     }
     this.motion = message.motion;
     this.performerViews.reset(this.tracks);
+    this.collector.liveLatency.clear();
     this.dispatch("figure");
     this.dispatch("blocks");
   }
@@ -368,11 +373,30 @@ export class Viewer extends EventTarget {
 
   private onOverlay(message: Overlay, now: number): void {
     this.performerViews.overlays.put(message);
-    const latenessUs = this.clock.at(now * 1000) - message.due;
+    this.recordArrival(message.due, message.earlier.length + 1, now);
+  }
+
+  private onLive({ due, frames, blocks }: Live, now: number): void {
+    this.recordArrival(due, frames, now);
+    for (const [performer, block] of blocks) {
+      try {
+        this.performerViews.all[performer]?.putLive(due, frames, block);
+      } catch (error) {
+        if (!(error instanceof DamagedBlock)) throw error;
+        this.collector.damagedCount++;
+        continue;
+      }
+      this.collector.liveLatency.add(performer, block.ageUs, now);
+    }
+  }
+
+  /** Adapt the play-out delay to a message of `frames` frames, the last due at clock time `due`. */
+  private recordArrival(due: number, frames: number, now: number): void {
+    const latenessUs = this.clock.at(now * 1000) - due;
     this.collector.addLateness(latenessUs / 1000);
     // the message is needed one frame before its first: interpolation towards that begins then
     if (Number.isFinite(this.clock.errorBound))
-      this.delay.addLateness(latenessUs + (message.earlier.length + 1) * OVERLAY_FRAME_INTERVAL_US, now * 1000);
+      this.delay.addLateness(latenessUs + frames * OVERLAY_FRAME_INTERVAL_US, now * 1000);
   }
 
   private dispatch(event: string): void {

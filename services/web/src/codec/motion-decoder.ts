@@ -61,16 +61,15 @@ export function reconstruct(q: number): number {
   return q > 0 ? q - bias : q + bias;
 }
 
+/** What the decoder of a block needs of its track. */
+export type BlockTrack = Pick<MotionTrack, "fps" | "blockFrames" | "weights" | "referenceRotations">;
+
 /**
  * Decodes one block of `track`. `prior` must be the one with which the block was encoded.
  *
  * @throws DamagedBlock
  */
-export function decodeMotionBlock(
-  track: MotionTrack,
-  data: Uint8Array,
-  prior: Prior = loadShippedPrior(),
-): MotionBlock {
+export function decodeMotionBlock(track: BlockTrack, data: Uint8Array, prior: Prior = loadShippedPrior()): MotionBlock {
   const { frames, step, heading, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps);
   const size = stepSize(step, frames);
   const { inverseWeights } = track.weights;

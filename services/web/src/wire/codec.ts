@@ -6,11 +6,14 @@ import {
   packInput,
   packPing,
   packPong,
+  packSample,
   unpackData,
   unpackInput,
   unpackPing,
   unpackPong,
+  unpackSample,
 } from "./fixed-message";
+import { packLive, unpackLive } from "./live";
 import { isMapType, packMap, unpackMap } from "./map-message";
 import { MESSAGE_TYPES, type Message } from "./messages";
 import { MULTI_PERFORMER_OVERLAY_TYPE, packOverlay, unpackOverlay } from "./overlay";
@@ -19,9 +22,11 @@ const FIXED_UNPACKERS = new Map<number, (bytes: Uint8Array) => Message>([
   [MESSAGE_TYPES.Data, unpackData],
   [MESSAGE_TYPES.Overlay, unpackOverlay],
   [MULTI_PERFORMER_OVERLAY_TYPE, unpackOverlay],
+  [MESSAGE_TYPES.Live, unpackLive],
   [MESSAGE_TYPES.Pong, unpackPong],
   [MESSAGE_TYPES.Ping, unpackPing],
   [MESSAGE_TYPES.Input, unpackInput],
+  [MESSAGE_TYPES.Sample, unpackSample],
 ]);
 
 /** Encodes a message. */
@@ -31,12 +36,16 @@ export function pack(message: Message): Uint8Array<ArrayBuffer> {
       return packData(message);
     case "Overlay":
       return packOverlay(message);
+    case "Live":
+      return packLive(message);
     case "Ping":
       return packPing(message);
     case "Pong":
       return packPong(message);
     case "Input":
       return packInput(message);
+    case "Sample":
+      return packSample(message);
     default:
       return packMap(message);
   }

@@ -1,15 +1,19 @@
-/** Encoders and decoders of the messages of fixed layout (`proto/messages.md`, 3.4 to 3.6). */
+/** Encoders and decoders of the messages of fixed layout (`proto/messages.md`, 3.4, 3.6 and 3.10). */
 
+import { JOINT_COUNT } from "../motion/skeleton";
 import { allocateMessage, dataViewOf, getU64, setU64 } from "./byte-layout";
 import { MalformedMessage } from "./errors";
 import { MAX_LIMBS } from "./limbs";
-import { type Data, INPUT_TARGET, type Input, MESSAGE_TYPES, type Ping, type Pong } from "./messages";
+import { type Data, INPUT_TARGET, type Input, MESSAGE_TYPES, type Ping, type Pong, type Sample } from "./messages";
 
 /** Bytes before the index of a block. */
 const DATA_HEADER_BYTES = 2;
 /** Bytes of the index at most, LEB128. */
 const MAX_INDEX_BYTES = 3;
 const FIXED_MESSAGE_BYTES = 32;
+const SAMPLE_BYTES = 136;
+const SAMPLE_ROOT_AT = 16;
+const SAMPLE_ROTATIONS_AT = 28;
 
 function viewOfFixedMessage(bytes: Uint8Array, name: string): DataView {
   if (bytes.length !== FIXED_MESSAGE_BYTES)
@@ -111,5 +115,37 @@ export function unpackInput(bytes: Uint8Array): Input {
     sequence: view.getUint32(8, true),
     sampled: getU64(view, 12, "Input, sampled"),
     values,
+  };
+}
+
+/** Encodes a sample: 136 bytes. */
+export function packSample(message: Sample): Uint8Array<ArrayBuffer> {
+  const [bytes, view] = allocateMessage(MESSAGE_TYPES.Sample, SAMPLE_BYTES);
+  view.setUint32(4, message.sequence, true);
+  setU64(view, 8, message.sampled);
+  message.root.forEach((value, axis) => view.setFloat32(SAMPLE_ROOT_AT + 4 * axis, value, true));
+  message.rotations.forEach((value, nth) => view.setInt16(SAMPLE_ROTATIONS_AT + 2 * nth, value, true));
+  return bytes;
+}
+
+/** @throws MalformedMessage, also for a position that is not finite */
+export function unpackSample(bytes: Uint8Array): Sample {
+  if (bytes.length !== SAMPLE_BYTES)
+    throw new MalformedMessage(`Sample has ${bytes.length} bytes, expected ${SAMPLE_BYTES} bytes`);
+  const view = dataViewOf(bytes);
+  const root: [number, number, number] = [
+    view.getFloat32(SAMPLE_ROOT_AT, true),
+    view.getFloat32(SAMPLE_ROOT_AT + 4, true),
+    view.getFloat32(SAMPLE_ROOT_AT + 8, true),
+  ];
+  if (!root.every(Number.isFinite)) throw new MalformedMessage("Sample has a root position that is not finite");
+  return {
+    name: "Sample",
+    sequence: view.getUint32(4, true),
+    sampled: getU64(view, 8, "Sample, sampled"),
+    root,
+    rotations: Int16Array.from({ length: JOINT_COUNT * 3 }, (_, nth) =>
+      view.getInt16(SAMPLE_ROTATIONS_AT + 2 * nth, true),
+    ),
   };
 }

@@ -2,13 +2,14 @@
 
 import { decode, encode } from "@msgpack/msgpack";
 import { MalformedMessage } from "./errors";
-import { MAX_LIMBS } from "./limbs";
-import { MESSAGE_TYPES, type Message, type PuppeteerPresence, type Track } from "./messages";
+import { MAX_LIMBS, MAX_PERFORMERS } from "./limbs";
+import { type LivePresence, MESSAGE_TYPES, type Message, type PuppeteerPresence, type Track } from "./messages";
 
 /** Returns a field's value, or throws MalformedMessage with the expected form. */
 type FieldParser = (value: unknown) => unknown;
 
-type MapMessageName = Exclude<Message["name"], "Data" | "Overlay" | "Ping" | "Pong" | "Input">;
+type FixedMessageName = "Data" | "Overlay" | "Live" | "Ping" | "Pong" | "Input" | "Sample";
+type MapMessageName = Exclude<Message["name"], FixedMessageName>;
 
 /** Bound on lists and maps: above any valid message, and fast to decode. */
 const MAX_ENTRIES = 100_000;
@@ -53,6 +54,16 @@ const puppeteer = mapOf(
     colour: count(value.colour) as number,
   }),
 );
+const performer: FieldParser = (value) => (
+  count(value), requireValid((value as number) < MAX_PERFORMERS, `a performer, 0..${MAX_PERFORMERS - 1}`), value
+);
+const livePerformer = mapOf(
+  (value): LivePresence => ({
+    performer: performer(value.performer) as number,
+    id: text(value.id) as string,
+    name: text(value.name) as string,
+  }),
+);
 
 /** Requests for each of the `limbs` read before; absent, there are none. */
 const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>>): unknown => {
@@ -82,7 +93,13 @@ const MESSAGE_FIELDS: {
     loop: flag,
     duration: count,
   },
-  Presence: { viewers: count, puppeteers: list(puppeteer), limbs: list(optional(text)), asks: asksPerLimb },
+  Presence: {
+    viewers: count,
+    puppeteers: list(puppeteer),
+    limbs: list(optional(text)),
+    asks: asksPerLimb,
+    live: optional(list(livePerformer)),
+  },
   Problem: { title: text, detail: text },
   Welcome: { id: text, colour: count, lead: count },
   Grant: { limb, epoch: count },

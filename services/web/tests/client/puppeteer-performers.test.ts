@@ -110,6 +110,7 @@ describe("own limb of another performer", () => {
     const before = currentPoses();
     socket.receive({
       name: "Presence",
+      live: null,
       viewers: 2,
       puppeteers: [],
       limbs: [null, null, null, null, "b2", null, null, null],
@@ -142,6 +143,7 @@ describe("change to a motion with fewer performers", () => {
   test("ends requests for removed limbs, not as free", () => {
     socket.receive({
       name: "Presence",
+      live: null,
       viewers: 2,
       puppeteers: [],
       limbs: [...unheld(4), "b2", ...unheld(3)],
@@ -150,17 +152,18 @@ describe("change to a motion with fewer performers", () => {
     puppeteer.ask(4);
     socket.receive({
       name: "Presence",
+      live: null,
       viewers: 2,
       puppeteers: [],
       limbs: [...unheld(4), "b2", ...unheld(3)],
       asks: [...noAsks(4), ["a1"], ...noAsks(3)],
     });
     expect(puppeteer.isAsking(4)).toBe(true);
-    socket.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
+    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
     expect([puppeteer.isAsking(4), events]).toEqual([false, [["lapsed", { limb: 4, free: false }]]]);
     // a request that Presence never listed lapses, too
     puppeteer.ask(5);
-    socket.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
+    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
     expect([puppeteer.isAsking(5), events[1]]).toEqual([false, ["lapsed", { limb: 5, free: false }]]);
     // no puppeteer holds it any more
     const before = tipPosition(4);

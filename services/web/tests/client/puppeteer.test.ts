@@ -138,7 +138,7 @@ describe("limb", () => {
 
 describe("request for a limb that another puppeteer holds", () => {
   const presence = (limbs: (string | null)[], asks: string[][]) =>
-    socket.receive({ name: "Presence", viewers: 2, puppeteers: [], limbs, asks });
+    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: [], limbs, asks });
   const held = ["b2", null, null, null];
   let events: unknown[];
 
@@ -363,6 +363,7 @@ describe("own limb", () => {
     const before = tipPosition();
     socket.receive({
       name: "Presence",
+      live: null,
       viewers: 2,
       puppeteers: [],
       limbs: ["b2", null, null, null],

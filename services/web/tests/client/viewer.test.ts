@@ -47,6 +47,7 @@ describe("start", () => {
     FakeWebSocket.last.receive(header(), description(), timeline({ clock: EPOCH_US + 80_000 }));
     FakeWebSocket.last.receive({
       name: "Presence",
+      live: null,
       viewers: 1,
       puppeteers: [],
       limbs: [null, null, null, null],

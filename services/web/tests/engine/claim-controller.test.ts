@@ -70,7 +70,7 @@ afterEach(() => {
 /** Send a presence message on both connections. */
 function sendPresence(limbs: (string | null)[], asks: string[][] = [[], [], [], []]): void {
   for (const socket of [stream, control])
-    socket.receive({ name: "Presence", viewers: 2, puppeteers: PEOPLE, limbs, asks });
+    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: PEOPLE, limbs, asks });
 }
 
 describe("limb held by another user", () => {

@@ -65,6 +65,7 @@ test("the page is sent every change of the playback with its values", () => {
   stream.receive(header(), description(), timeline({ loop: true }));
   stream.receive({
     name: "Presence",
+    live: null,
     viewers: 3,
     puppeteers: PEOPLE,
     limbs: [null, "m", null, null],
@@ -100,6 +101,7 @@ test("a limb that somebody else holds is asked for, with an offer in the toast",
   for (const socket of [stream, control])
     socket.receive({
       name: "Presence",
+      live: null,
       viewers: 2,
       puppeteers: PEOPLE,
       limbs: [null, "m", null, null],

@@ -11,6 +11,7 @@ import {
 test("holders and requesters of limbs have names and colours", () => {
   const presence = {
     name: "Presence" as const,
+    live: null,
     viewers: 2,
     puppeteers: [
       { id: "a", name: "Aiko", colour: 0 },

@@ -32,6 +32,11 @@ function toMessage({ name, fields }: MessageVectors["valid"][number]): Message {
     read.limbs = frame(read.limbs as Record<string, number[]>);
     read.earlier = (read.earlier as Record<string, number[]>[]).map(frame);
   }
+  if (name === "Live") {
+    const blocks = Object.entries(read.blocks as Record<string, { age_us: number; data: Uint8Array }>);
+    read.blocks = new Map(blocks.map(([performer, { age_us: ageUs, data }]) => [Number(performer), { ageUs, data }]));
+  }
+  if (name === "Sample") read.rotations = Int16Array.from(read.rotations as number[]);
   return { name, ...read } as unknown as Message;
 }
 
@@ -66,6 +71,7 @@ test("the error names the field and the expected form", () => {
 test("asks has one list per limb, for any number of performers", () => {
   const presence = (limbs: number, asks: number): Message => ({
     name: "Presence",
+    live: null,
     viewers: 1,
     puppeteers: [],
     limbs: Array.from({ length: limbs }, () => null),
@@ -80,6 +86,17 @@ test("asks has one list per limb, for any number of performers", () => {
   }
 });
 
+test("live performer has a number of 0..3, an id and a name", () => {
+  const presence = (entry: object): Message =>
+    ({ name: "Presence", viewers: 1, puppeteers: [], limbs: [], asks: [], live: [entry] }) as unknown as Message;
+  const valid = presence({ performer: 3, id: "p", name: "Aiko" });
+  expect(unpack(pack(valid))).toEqual(valid);
+  expect(() => unpack(pack(presence({ performer: 4, id: "p", name: "Aiko" })))).toThrow(
+    "Presence, live: expected a performer, 0..3",
+  );
+  expect(() => unpack(pack(presence({ performer: 0, id: "p" })))).toThrow("Presence, live: expected text");
+});
+
 test("unknown keys are skipped", () => {
   const claim = { name: "Claim", limb: 2, later: "added" } as Message;
   expect(unpack(pack(claim))).toEqual({ name: "Claim", limb: 2 });
@@ -88,7 +105,7 @@ test("unknown keys are skipped", () => {
 test("arbitrary bytes are decoded, skipped or malformed", () => {
   const outcome = new HostileInputCounts(MalformedMessage);
   const types = fc.constantFrom(
-    ...Array.from({ length: 15 }, (_, i) => i),
+    ...Array.from({ length: 16 }, (_, i) => i),
     63,
     64,
     65,
@@ -121,6 +138,24 @@ test("golden messages with a changed byte throw only MalformedMessage", () => {
     { numRuns: 3000 },
   );
   outcome.print("golden messages with a changed byte");
+});
+
+test("samples read back unchanged", () => {
+  const real = fc.float({ noNaN: true, noDefaultInfinity: true });
+  const rotations = fc.array(fc.integer({ min: -32768, max: 32767 }), { minLength: 54, maxLength: 54 });
+  fc.assert(
+    fc.property(
+      fc.nat(0xffffffff),
+      fc.integer({ min: 0, max: Number.MAX_SAFE_INTEGER }),
+      fc.tuple(real, real, real),
+      rotations,
+      (sequence, sampled, root, numbers) => {
+        const sample: Message = { name: "Sample", sequence, sampled, root, rotations: Int16Array.from(numbers) };
+        expect(pack(sample)).toHaveLength(136);
+        expect(unpack(pack(sample))).toEqual(sample);
+      },
+    ),
+  );
 });
 
 test("inputs and pings read back unchanged", () => {
