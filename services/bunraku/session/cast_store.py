@@ -8,7 +8,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.http.problem_details import motion_not_found
 from bunraku.motion.skeleton import Figure
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast, CastMember, pack_cast_motion, pack_rest_motion
+from bunraku.session.cast import EMPTY_CAST, Cast, CastMember, pack_cast_motion, pack_rest_motion
 from bunraku.storage.motion_store import MotionStore
 
 
@@ -34,14 +34,16 @@ class CastStore:
         return stored
 
     async def refresh(self, cast: Cast) -> None:
-        """Store the motions of a cast again: motions that are not in the library are removed when they are old."""
-        if not cast.members:
-            return
-        await self._motion_store.put(cast.motion, await self._pack(cast))
+        """Store the motions of a cast again, so that they do not look abandoned."""
+        for motion in _own_motions(cast):
+            await self._motion_store.touch(motion)
 
-    async def remove(self, member: CastMember) -> None:
-        """Remove a performer's figure."""
-        await self._motion_store.remove(member.rest_motion)
+    async def remove(self, cast: Cast, kept: Cast = EMPTY_CAST) -> None:
+        """Remove the motions of a cast, except those that another cast needs."""
+        needed = _own_motions(kept)
+        for motion in _own_motions(cast):
+            if motion not in needed:
+                await self._motion_store.remove(motion)
 
     async def _pack(self, cast: Cast) -> bytes:
         base = await self._require(cast.base) if cast.base else None
@@ -56,3 +58,8 @@ class CastStore:
         if stored is None:
             raise motion_not_found(motion_id)
         return stored
+
+
+def _own_motions(cast: Cast) -> list[str]:
+    """Return the ids of the motions that exist for a cast only."""
+    return [cast.motion, *(member.rest_motion for member in cast.members)] if cast.members else []

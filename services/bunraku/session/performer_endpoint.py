@@ -9,6 +9,7 @@ performance has ended.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -21,13 +22,16 @@ from bunraku.messaging.performance_request import PERFORMANCE_SUBJECT
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast, CastMember
+from bunraku.session.cast import EMPTY_CAST, Cast, CastMember
 from bunraku.session.stage import Stage
 from bunraku.wire.live import Sample
 from bunraku.wire.messages import unpack
 
 RECONNECT_TIMEOUT_US = 30_000_000
 """Time without a connection after which a performance ends."""
+REPLACED_LIFETIME_US = 60_000_000
+"""Time for which viewers who join may still ask for the motion of a former cast."""
+REFRESH_INTERVAL_US = 6 * 3_600_000_000
 FLUSH_TIMEOUT_S = 3.0
 """Time in which the connection of an ended performer stores its last samples."""
 
@@ -44,6 +48,16 @@ class CastEditor(Protocol):
         """Save another motion, then show it."""
 
 
+class CastMotions(Protocol):
+    """Store of the motions of casts."""
+
+    async def refresh(self, cast: Cast) -> None:
+        """Store the motions of a cast again."""
+
+    async def remove(self, cast: Cast, kept: Cast) -> None:
+        """Remove the motions of a cast, except those that another cast needs."""
+
+
 @dataclass(slots=True)
 class _Attachment:
     """Connection of a performer; `connection` is None before one was heard of."""
@@ -56,11 +70,15 @@ class _Attachment:
 class PerformerEndpoint:
     """Endpoint of the live performers of one stage."""
 
-    def __init__(self, stage: Stage, context: ServiceContext, editor: CastEditor) -> None:
+    def __init__(self, stage: Stage, context: ServiceContext, editor: CastEditor, casts: CastMotions) -> None:
         self._stage = stage
         self._context = context
         self._clock = context.clock
         self._editor = editor
+        self._casts = casts
+        self._refreshed_at = context.clock()
+        # casts that are not shown any more, and since when
+        self._replaced: list[tuple[int, Cast]] = []
         self._subject = f"session.{stage.id}"
         self._attachments: dict[str, _Attachment] = {}
         self._endings: dict[str, asyncio.Task[None]] = {}
@@ -91,6 +109,35 @@ class PerformerEndpoint:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+
+    def replace(self, cast: Cast) -> None:
+        """Remove the motions of a cast that is not shown any more, once nobody asks for them."""
+        self._replaced.append((self._clock(), cast))
+
+    async def maintain(self) -> None:
+        """Remove the motions of former casts, and refresh those of the present one."""
+        now = self._clock()
+        try:
+            while self._replaced and now - self._replaced[0][0] > REPLACED_LIFETIME_US:
+                await self._casts.remove(self._replaced[0][1], self._shown_cast)
+                del self._replaced[0]
+            if now - self._refreshed_at > REFRESH_INTERVAL_US:
+                await self._casts.refresh(self._stage.cast)
+                self._refreshed_at = now
+        except (BackendUnavailable, ProblemError) as error:
+            _log.warning("session %s: motions of its cast not maintained: %s; trying again", self._stage.id, error)
+
+    async def remove_motions(self) -> None:
+        """Remove the motions of all casts, as the session has ended."""
+        with contextlib.suppress(BackendUnavailable, ProblemError):
+            for _, cast in (*self._replaced, (0, self._stage.cast)):
+                await self._casts.remove(cast, EMPTY_CAST)
+
+    @property
+    def _shown_cast(self) -> Cast:
+        """The cast on the stage, also when its last performer has left and the figure is still there."""
+        shown = self._stage.timeline.motion
+        return next((cast for _, cast in self._replaced if cast.motion == shown), self._stage.cast)
 
     def expire(self, stalled_us: int) -> None:
         """End the performers without a connection; `stalled_us` is the time in which no message could be received."""

@@ -61,7 +61,7 @@ class Performers:
             else:
                 performer = await self._proxy(member.id).perform(member)
         except BaseException:
-            await self._sessions.casts.remove(member)
+            await self._sessions.casts.remove(Cast("", (member,)))
             await self._store.remove_header(member.id)
             raise
         return _performer_json(performer, header)

@@ -27,6 +27,7 @@ from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.problem import ProblemError
 from bunraku.session.cast import EMPTY_CAST, Cast
+from bunraku.session.cast_store import CastStore
 from bunraku.session.performer_endpoint import PerformerEndpoint
 from bunraku.session.puppeteer_input import PuppeteerInput
 from bunraku.session.puppeteer_roster import SessionFull
@@ -51,6 +52,8 @@ class StageOwner(Protocol):
 
     input_scheduler: InputScheduler
     """Turns of the puppeteers of all stages."""
+    casts: CastStore
+    """Motions of the casts of all stages."""
 
     async def load_cast(self, cast: Cast) -> StoredMotion:
         """Return the motion of a cast; raises `ProblemError`."""
@@ -79,7 +82,7 @@ class StageEndpoint:
         self._subject = f"session.{stage.id}"
         self._inputs: dict[str, PuppeteerInput] = {}
         self._join_rate = KeyedTokenBuckets(JOINS_PER_S, JOIN_BURST)
-        self._performers = PerformerEndpoint(stage, context, self)
+        self._performers = PerformerEndpoint(stage, context, self, owner.casts)
         bus = context.bus
         operations: dict[str, Callable[[Any], Awaitable[Any]]] = {
             "describe": self._answer_describe,
@@ -152,6 +155,7 @@ class StageEndpoint:
             if not cast.motion:
                 # nothing else to play: the figure of the last performer stays, at rest
                 await self._owner.save_record(self.stage, self.stage.timeline, EMPTY_CAST)
+                self._performers.replace(self.stage.cast)
                 self.stage.change_cast(EMPTY_CAST)
                 return
             position = position_at(self.stage.timeline, self._clock() + EDIT_LEAD_US)
@@ -166,6 +170,8 @@ class StageEndpoint:
         # saved before it is shown: a server that takes over continues what viewers have seen
         await self._owner.save_record(stage, state or stage.timeline, cast)
         if state is not None:
+            if motion is not None and stage.cast.members:
+                self._performers.replace(stage.cast)
             stage.apply_edit(state, motion, cast)
 
     async def _answer_log(self, seconds: float | None) -> dict[str, Any]:
@@ -180,6 +186,7 @@ class StageEndpoint:
     async def _answer_end(self, _: None) -> None:
         self._performers.end_all()
         await self._owner.end_session(self.stage.id)
+        await self._performers.remove_motions()
 
     async def _answer_join(self, values: list[Any]) -> dict[str, Any]:
         # replicas of earlier releases send no subject
@@ -222,6 +229,7 @@ class StageEndpoint:
             stalled_us = max(now - begin - round(PUPPETEER_HEARTBEAT_S * 1e6), 0)
             self.stage.presence_publisher.expire_viewer_counts(VIEWER_COUNT_TIMEOUT_US, stalled_us)
             self._performers.expire(stalled_us)
+            await self._performers.maintain()
             for puppeteer in self.stage.puppeteers:
                 puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:

@@ -82,6 +82,12 @@ class MotionStore:
         self._cache_motion(stored)
         return stored
 
+    async def touch(self, motion_id: str) -> None:
+        """Store a motion again, if it exists: one that is not in the library is removed when it is old."""
+        packed = await self._objects.get(_motion_path(motion_id))
+        if packed is not None:
+            await self._objects.put(_motion_path(motion_id), packed)
+
     async def remove(self, motion_id: str) -> None:
         """Remove a motion if it exists."""
         self._loaded.pop(motion_id, None)
