@@ -11,7 +11,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.storage.motion_id import derive_motion_id
 from tests.processes import ServerProcess, free_port
 from tests.servers import make_bvh_clip
 from tests.time_limit import HANG_TIMEOUT_S

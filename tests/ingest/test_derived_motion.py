@@ -8,12 +8,12 @@ import pytest
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.ingest.derived_motion import Derivation, DerivationJob, DerivedMotionFactory
-from bunraku.ingest.motion_id import derive_digest
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
+from bunraku.storage.motion_id import derive_digest
 from bunraku.storage.record import CatalogueEntry
 from tests.vectors.blocks import random_motion
 

@@ -16,8 +16,8 @@ from bunraku.ingest.keyframe import (
     digest_staging,
     parse_staging,
 )
-from bunraku.ingest.motion_id import derive_digest
 from bunraku.runtime.problem import ProblemError
+from bunraku.storage.motion_id import derive_digest
 
 CAMERA = {"time": 0, "position": [0, 1, 4], "gaze": [0, 1, 0], "fov": 0.5}
 LIGHT = {"time": 0, "position": [0, 3, 4], "colour": [1, 1, 1], "intensity": 90}

@@ -7,13 +7,13 @@ import pytest
 
 from bunraku.ingest.audio import create_audio_job
 from bunraku.ingest.motion import MotionOperation, create_motion_job
-from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.source_file import SourceFile
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
+from bunraku.storage.motion_id import derive_motion_id
 from tests.servers import make_bvh_clip
 
 

@@ -31,7 +31,7 @@ def make_timeline(epoch: int, motion: str, clock: int) -> TimelineState:
 def add_overlays(log: SessionLog, numbers: range, limbs: int = 1) -> list[Overlay]:
     overlays = [make_overlay(number, limbs) for number in numbers]
     for overlay in overlays:
-        log.add_overlay(overlay.due, overlay.pack())
+        log.add_message(overlay.due, overlay.pack())
     return overlays
 
 
@@ -44,7 +44,7 @@ def test_packed_log_holds_the_same_timelines_and_overlays() -> None:
     reloaded = SessionLog.unpack(log.pack())
     assert list(reloaded.timelines) == states
     assert reloaded.motions == ("one", "two")
-    assert list(reloaded.overlays()) == overlays == list(log.overlays())
+    assert list(reloaded.messages()) == overlays == list(log.messages())
 
 
 @pytest.mark.parametrize("begin", [0, 1, 12_345_678, CHUNK_DURATION_US, 31_000_000, 1 << 50])
@@ -55,24 +55,24 @@ def test_part_holds_what_viewers_saw_since_its_begin(begin: int) -> None:
         log.add_timeline(state)
     overlays = add_overlays(log, range(1_000))
     part = SessionLog.unpack(log.pack(begin))
-    kept = list(part.overlays())
+    kept = list(part.messages())
     assert kept == overlays[len(overlays) - len(kept) :]
     assert [overlay for overlay in overlays if overlay.due >= begin] == [o for o in kept if o.due >= begin]
     assert not kept or begin - kept[0].due <= CHUNK_DURATION_US
     # the first timeline is the one that applies at the begin
     assert list(part.timelines) == [state for state in states if state.clock + 4_000_000 > begin] or [states[-1]]
-    assert list(log.overlays(begin)) == kept
+    assert list(log.messages(begin)) == kept
 
 
 def test_hours_of_one_controlled_limb_keep_the_longest_recording() -> None:
     log = SessionLog()
     count = 3 * LOG_DURATION_US // MESSAGE_INTERVAL_US
     for number in range(count):
-        log.add_overlay(number * MESSAGE_INTERVAL_US, b"a message")
+        log.add_message(number * MESSAGE_INTERVAL_US, b"a message")
     end = (count - 1) * MESSAGE_INTERVAL_US
     first = log._chunks[0]
     assert end - LOG_DURATION_US - 2 * CHUNK_DURATION_US < first.begin_us <= end - LOG_DURATION_US
-    assert sum(len(chunk.messages) for chunk in log._chunks) == log._overlay_bytes < 1 << 19
+    assert sum(len(chunk.messages) for chunk in log._chunks) == log._message_bytes < 1 << 19
 
 
 def test_all_limbs_at_the_full_frame_rate_keep_the_longest_recording() -> None:
@@ -84,7 +84,7 @@ def test_log_is_bounded_in_bytes_and_timelines(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(session_log, "MAX_LOG_BYTES", 30_000)
     log = SessionLog()
     overlays = add_overlays(log, range(3_000))
-    kept = list(log.overlays())
+    kept = list(log.messages())
     assert 0 < len(kept) < len(overlays)
     assert kept == overlays[-len(kept) :]
     assert len(log.pack()) < 31_000
@@ -124,4 +124,4 @@ def test_invalid_bytes_raise_corrupt_session_log(data: bytes) -> None:
 def test_cut_or_foreign_messages_raise_corrupt_session_log(overlays: bytes) -> None:
     log = SessionLog.unpack(MAGIC + msgpack.packb({"timelines": [], "overlays": overlays}))
     with pytest.raises(CorruptSessionLog, match="at byte 0"):
-        list(log.overlays())
+        list(log.messages())

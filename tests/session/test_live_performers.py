@@ -18,7 +18,7 @@ from bunraku.playout import timeline
 from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.performance import FADE_US, HOLD_US
 from bunraku.runtime.clock import clock
-from bunraku.session.live_performers import LivePerformer
+from bunraku.session.cast import Cast, CastMember
 from bunraku.session.stage import OVERLAY_LEAD_US, SessionStart, Stage
 from bunraku.wire.live import Live, Sample
 from bunraku.wire.messages import Claim, Input
@@ -46,7 +46,6 @@ class Opened:
         self.stage = stage
         self.audience = StageMessages(bus)
         self.buffer = LiveBuffer(LiveTrack(motion.first_track.skeleton))
-        stage.live.add(0, LivePerformer("p", motion.first_track, 60.0))
 
     @asynccontextmanager
     async def performing(self) -> AsyncIterator[None]:
@@ -70,9 +69,11 @@ class Opened:
 async def opened() -> AsyncIterator[Opened]:
     await asyncio.to_thread(motion_decoder.warm_up)
     bus = MemoryBus()
-    motion = stored_motion("one", 5)
-    state = timeline.start("one", motion.first_track.duration_us, clock())
-    stage = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
+    # a stored motion in the place of one at rest
+    cast = Cast("", (CastMember("p", "Aiko", 60.0, None),))
+    motion = stored_motion(cast.motion, 5)
+    state = timeline.start(motion.id, motion.first_track.duration_us, clock())
+    stage = Stage(SessionStart("s", motion, state, state.clock, cast=cast), bus, clock)
     yield Opened(stage, motion, bus)
     await stage.close()
 

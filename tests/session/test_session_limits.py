@@ -21,6 +21,7 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import session_manager
+from bunraku.session.cast import EMPTY_CAST
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.session_registry import SessionRecord, session_key
 from bunraku.session.stage import Stage
@@ -197,7 +198,7 @@ async def test_new_session_is_not_idle_yet(
 async def test_records_of_earlier_and_later_releases_are_read() -> None:
     state = timeline.start("one", 2_000_000, 5).pack()
     assert SessionRecord.unpack(msgpack.packb(["owner", 5, state])) == SessionRecord("owner", 5, state, "")
-    later = SessionRecord.unpack(msgpack.packb(["owner", 5, state, "aiko", {"more": 1}]))
+    later = SessionRecord.unpack(msgpack.packb(["owner", 5, state, "aiko", EMPTY_CAST.to_values(), {"more": 1}]))
     assert later == SessionRecord("owner", 5, state, "aiko")
     # what a replica of the first release can read
     assert msgpack.unpackb(SessionRecord("owner", 5, state).pack()) == ["owner", 5, state]

@@ -195,7 +195,7 @@ async def test_edit_at_a_replica_that_lost_the_session_is_refused(
     await published.wait_for(TimelineState)
     stage = stalled.sessions._endpoints[opened["id"]].stage
     with pytest.raises(ProblemError) as refused:
-        await stalled.sessions.save_record(stage, stage.timeline)
+        await stalled.sessions.save_record(stage, stage.timeline, stage.cast)
     assert refused.value.status == 503
     assert (await surviving.sessions.stage_proxy(opened["id"]).describe())["id"] == opened["id"]
     assert opened["id"] not in stalled.sessions._endpoints

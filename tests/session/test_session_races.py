@@ -182,7 +182,7 @@ async def test_edit_of_a_replaced_stage_does_not_change_the_record(
     async with replaced.record_lock:
         edited = replaced.stage.plan_edit(SessionEdit(position=300_000), None)
         assert edited is not None
-        saving = asyncio.create_task(owner.sessions.save_record(replaced.stage, edited))
+        saving = asyncio.create_task(owner.sessions.save_record(replaced.stage, edited, replaced.stage.cast))
         await asyncio.sleep(0)
         await owner.sessions._close_stage(session)
         owner.sessions._review(session)

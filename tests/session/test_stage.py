@@ -16,6 +16,7 @@ from bunraku.playout import timeline
 from bunraku.playout.session_log import SessionLog
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
+from bunraku.session.cast import EMPTY_CAST, Cast
 from bunraku.session.presence import PRESENCE_BURST
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
 from bunraku.session.schema import SessionEdit
@@ -99,7 +100,7 @@ async def change_motion(stage: Stage, motion: StoredMotion) -> None:
     await asyncio.to_thread(load_bend_tables, motion)
     state = stage.plan_edit(SessionEdit(motion=motion.id), motion)
     assert state is not None
-    stage.apply_edit(state, motion)
+    stage.apply_edit(state, motion, Cast(motion.id))
 
 
 async def test_edit_applies_after_the_lead_time(stage: Stage, bus: MemoryBus) -> None:
@@ -108,7 +109,7 @@ async def test_edit_applies_after_the_lead_time(stage: Stage, bus: MemoryBus) ->
     planned = stage.plan_edit(SessionEdit(playing=False), None)
     assert planned is not None
     assert stage.timeline is before
-    stage.apply_edit(planned, None)
+    stage.apply_edit(planned, None, EMPTY_CAST)
     (state,) = await audience.wait_for(1, TimelineState)
     assert isinstance(state, TimelineState)
     assert (state.epoch, state.playing) == (before.epoch + 1, False)
@@ -312,7 +313,7 @@ async def test_log_holds_the_published_overlays_and_timelines(stage: Stage, bus:
         await audience.wait_until_at_rest()
     published = [message for message in audience.messages if isinstance(message, Overlay)]
     log = SessionLog.unpack(stage.log.pack())
-    assert list(log.overlays()) == published
+    assert list(log.messages()) == published
     assert any(overlay.limbs for overlay in published)
     assert list(log.timelines) == [stage.timeline]
 

@@ -15,6 +15,8 @@ from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
+from bunraku.session.cast import Cast
+from bunraku.session.cast_store import CastStore
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint
@@ -36,11 +38,12 @@ class FakeStageOwner:
         self.fails = False
         self.input_scheduler = InputScheduler(TURN_US)
         self.ended: list[str] = []
+        self.casts: CastStore
 
-    async def load_motion(self, motion: str) -> StoredMotion:
-        raise ProblemError(404, "No such motion", motion)
+    async def load_cast(self, cast: Cast) -> StoredMotion:
+        raise ProblemError(404, "No such motion", cast.motion)
 
-    async def save_record(self, stage: Stage, state: TimelineState) -> None:
+    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:  # noqa: ARG002
         self.saved.append(state.pack())
         self.shown.append(stage.timeline.pack())
         if self.fails:
@@ -69,6 +72,7 @@ async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncItera
     assert stored is not None
     state = timeline.start("one", stored.first_track.duration_us, context.clock())
     stage = Stage(SessionStart("s", stored, state, state.clock), context.bus, context.clock)
+    owner.casts = CastStore(context.motion_store)
     opened = StageEndpoint(stage, context, owner, 1)
     yield opened
     await opened.close()

@@ -15,12 +15,12 @@ from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.motion_track import MotionTrack, parse_motion_track
 from bunraku.ingest.job_process import JobKind
-from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.result import JobResult
 from bunraku.marionette.solver.limb_solver import LimbSolver
 from bunraku.session.limb_solver import load_compiled_solver
 from bunraku.session.pose_cache import shared_block_store
 from bunraku.session.stage import load_bend_tables
+from bunraku.storage.motion_id import derive_motion_id
 from bunraku.wire.messages import Data
 from tests.vectors.blocks import random_motion
 

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import httpx2
 
-from bunraku.ingest.motion_id import derive_motion_id
+from bunraku.storage.motion_id import derive_motion_id
 from tests.servers import make_bvh_clip
 from tests.verify.result import FaultResult
 from tests.verify.scenario import Scenario

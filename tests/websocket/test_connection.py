@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from bunraku.runtime.input_scheduler import TURN_US
-from bunraku.websocket.connection import FRAMES_PER_TURN, FrameLimit, WebSocketConnection
+from bunraku.websocket.connection import FRAMES_PER_TURN, BinaryListener, FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import Opcode
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from tests.raw_client import client_frame
@@ -51,7 +51,7 @@ class FakeTransport(asyncio.Transport):
         self.is_closed = True
 
 
-class RecordingListener:
+class RecordingListener(BinaryListener):
     """Listener that records its events."""
 
     def __init__(self) -> None:

@@ -20,7 +20,7 @@ from websockets.exceptions import ConnectionClosed
 
 from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.websocket import handoff
-from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.connection import BinaryListener, WebSocketConnection
 from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.handoff import HandoffProtocol, detach, reject
 from bunraku.websocket.subprotocol import CloseConnection
@@ -28,7 +28,7 @@ from tests.raw_client import client_frame, open_raw, upgrade_request
 from tests.time_limit import HANG_TIMEOUT_S
 
 
-class RecordingListener:
+class RecordingListener(BinaryListener):
     """Listener that records its events and echoes messages."""
 
     def __init__(self) -> None:

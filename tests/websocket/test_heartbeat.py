@@ -1,13 +1,13 @@
 from __future__ import annotations
 
-from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.connection import BinaryListener, WebSocketConnection
 from bunraku.websocket.heartbeat import HEARTBEAT_TIMEOUT_US, PING_AFTER_US, Heartbeat
 from tests.stream.fake_transport import FakeTransport
 
 RECEIVED_AT = 10**9
 
 
-class NullListener:
+class NullListener(BinaryListener):
     def on_message(self, message: bytes) -> None: ...
 
     def on_pong(self, _: bytes) -> bool:

@@ -10,7 +10,7 @@ import pytest
 
 from bunraku.kernels import load_kernels
 from bunraku.websocket import multicast
-from bunraku.websocket.connection import WebSocketConnection
+from bunraku.websocket.connection import BinaryListener, WebSocketConnection
 from bunraku.websocket.multicast import (
     MAX_PLAIN_GROUP,
     PLAIN_SENDER,
@@ -22,7 +22,7 @@ from bunraku.websocket.multicast import (
 from tests.time_limit import HANG_TIMEOUT_S
 
 
-class SilentListener:
+class SilentListener(BinaryListener):
     """Listener that ignores all events."""
 
     def on_message(self, message: bytes) -> None: ...

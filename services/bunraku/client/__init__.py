@@ -1,4 +1,4 @@
-"""Python SDK: `Client` (HTTP), `Viewer` (watch), `Puppeteer` (control limbs) and `OneEuro` (smooth noisy input).
+"""Python SDK: `Client` (HTTP), `Viewer` (watch), `Puppeteer` (control limbs), `Performer` (perform live), `OneEuro`.
 
 Names are imported at their first use, so that listing motions does not load a decoder.
 """
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bunraku.client.api import Client, ServerProblem
     from bunraku.client.one_euro import OneEuro
+    from bunraku.client.performer import Performer
     from bunraku.client.puppeteer import ControlRefused, Puppeteer
     from bunraku.client.reconnecting_connection import StreamEnded
     from bunraku.client.viewer import Viewer
@@ -17,6 +18,7 @@ _HOMES = {
     "Client": "api",
     "ControlRefused": "puppeteer",
     "OneEuro": "one_euro",
+    "Performer": "performer",
     "Puppeteer": "puppeteer",
     "ServerProblem": "api",
     "StreamEnded": "reconnecting_connection",
@@ -27,6 +29,7 @@ __all__ = [
     "Client",
     "ControlRefused",
     "OneEuro",
+    "Performer",
     "Puppeteer",
     "ServerProblem",
     "StreamEnded",

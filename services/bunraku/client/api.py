@@ -8,10 +8,14 @@ import os
 import secrets
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 from urllib.parse import quote, urlsplit, urlunsplit
 
 import httpx2
+
+if TYPE_CHECKING:
+    from bunraku.client.performer import Performer
+    from bunraku.motion.skeleton import Figure
 
 REQUEST_TIMEOUT = httpx2.Timeout(10.0, read=130.0)
 """Seconds. The answer to an upload comes after encoding; a recording is made within 120 s."""
@@ -131,6 +135,32 @@ class Client:
     async def edit_session(self, session: str, **edit: Any) -> dict[str, Any]:
         """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`."""
         return await self._request("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)
+
+    def perform(
+        self,
+        figure: Figure | None = None,
+        *,
+        name: str = "",
+        session: str | None = None,
+        fps: float = 60.0,
+        place: tuple[float, float, float] | None = None,
+    ) -> Performer:
+        """Return a live performer, an async context manager; the arguments are those of `Performer`."""
+        from bunraku.client.performer import Performer
+
+        return Performer(self, figure, name=name, session=session, fps=fps, place=place)
+
+    async def create_performer(self, new: Mapping[str, Any]) -> dict[str, Any]:
+        """Bring a live performer on a stage, with the fields of `POST /v1/performers`."""
+        return await self._request("POST", "/v1/performers", json=dict(new))
+
+    async def performer(self, performer: str) -> dict[str, Any]:
+        """Return one live performer."""
+        return await self._request("GET", f"/v1/performers/{quote(performer, safe='')}")
+
+    async def end_performer(self, performer: str) -> None:
+        """End a performance; its motion appears in the library within seconds."""
+        await self._request("DELETE", f"/v1/performers/{quote(performer, safe='')}")
 
     async def record(
         self,

@@ -38,6 +38,8 @@ _ERROR_BOUND_BIT_PRICE = 0.6
 _LIVE_MIN_ERROR_SHARE = 0.6
 """The `live` grade accepts a block whose largest error is at least this share of the bound."""
 _BOUND_MARGIN = 1 - 1e-6
+_STILL_TOLERANCE = 2.0**-13
+"""Difference of quaternions up to which joints have their references: that of two still frames, and of rounding."""
 
 
 def error_bound_refinement(error_bound_mm: float) -> Refinement:
@@ -71,6 +73,10 @@ class BlockEncoder:
         for joint, parent in enumerate(PARENTS[1:], 1):
             orientation[joint] = rotation.multiply(orientation[parent], motion.rotations[:, joint])
         self._orientation = orientation
+        # a live performer moves on the track of a motion at rest
+        self._is_still = track.is_still and np.allclose(
+            motion.rotations[:, 1:], track.reference_rotations(0)[1:], atol=_STILL_TOLERANCE
+        )
         self._points = np.ascontiguousarray(
             joint_and_tip_positions(motion.figure, motion.root, motion.rotations).transpose(1, 0, 2)
         )
@@ -112,7 +118,7 @@ class BlockEncoder:
         decoded = kernels.quantise_closed_loop(block, q)
         if refinement is not None:
             decoded = kernels.refine_coefficients(block, q, refinement)
-        if track.is_still:
+        if self._is_still:
             # the joints' references are the pose itself: joints that correct the root's error cost more than they gain
             q[2:] = 0
             decoded = kernels.compute_points(block.chain, block.quantiser, q)

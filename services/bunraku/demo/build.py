@@ -22,9 +22,9 @@ from bunraku.demo.wav import write_wav
 from bunraku.ingest.jobs.audio import add_audio
 from bunraku.ingest.jobs.motion import encode_file
 from bunraku.ingest.jobs.scene import add_scene_of_body
-from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.result import require_result
 from bunraku.motion.bvh_writer import write_bvh
+from bunraku.storage.motion_id import derive_motion_id
 
 
 def build_demo(folder: Path) -> tuple[bytes, dict[str, Any]]:

@@ -23,6 +23,7 @@ from bunraku.ingest.keyframe import MAX_BODY_BYTES as MAX_SCENE_BODY_BYTES
 from bunraku.ingest.keyframe import Staging
 from bunraku.ingest.metrics import register_metrics
 from bunraku.ingest.motion import MotionOperation, create_motion_job
+from bunraku.ingest.performance import PerformanceOperation
 from bunraku.ingest.performers import PerformersOperation, PerformersRequest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
@@ -51,6 +52,7 @@ def create_app(context: ServiceContext) -> FastAPI:
     scenes = SceneOperation(context, worker_slots)
     performers = PerformersOperation(context, worker_slots)
     recordings = RecordingOperation(context, worker_slots)
+    performances = PerformanceOperation(context, worker_slots)
     job_queue = JobQueue(context, worker_slots, {"motion": motions.run_job, "audio": soundtracks.run_job})
     uploads = UploadReceiver(context, job_queue)
 
@@ -58,13 +60,17 @@ def create_app(context: ServiceContext) -> FastAPI:
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         register_metrics(context.metrics, uploads, job_queue, worker_slots)
         recording_requests = context.bus.serve(RECORDING_SUBJECT, recordings.handle_message)
-        queue_task = asyncio.create_task(job_queue.run(), name="job queue")
+        tasks = (
+            asyncio.create_task(job_queue.run(), name="job queue"),
+            asyncio.create_task(performances.run(), name="performances"),
+        )
         try:
             yield
         finally:
             recording_requests.unsubscribe()
-            queue_task.cancel()
-            await asyncio.wait((queue_task,))
+            for task in tasks:
+                task.cancel()
+            await asyncio.wait(tasks)
             await job_queue.release_jobs()
 
     app = FastAPI(title="Bunraku ingest", lifespan=lifespan, openapi_url=None)

@@ -11,13 +11,13 @@ from bunraku.codec.container import StoredMotion
 from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.job_queue import JobDetails, UploadJob
-from bunraku.ingest.motion_id import derive_digest, derive_job_id
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.source_file import SourceFile, clean_filename
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
+from bunraku.storage.motion_id import derive_digest, derive_job_id
 from bunraku.storage.record import CatalogueEntry
 
 

@@ -11,11 +11,11 @@ from typing import Any
 
 from bunraku.codec.container import StoredMotion
 from bunraku.http.problem_details import motion_not_found
-from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.persistence import StoreOutcome, check_quota, store_motion
 from bunraku.ingest.result import JobRejection, JobResult, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
+from bunraku.storage.motion_id import derive_motion_id
 from bunraku.storage.record import CatalogueEntry
 
 DerivationJob = Callable[[str, StoredMotion], Awaitable[JobResult | JobRejection]]

@@ -22,6 +22,7 @@ class JobKind(StrEnum):
     AUDIO = "add"
     SCENE = "dress"
     PERFORMERS = "gather"
+    PERFORMANCE = "perform"
 
 
 worker_process.preload_modules(
@@ -30,6 +31,7 @@ worker_process.preload_modules(
     "bunraku.ingest.jobs.audio",
     "bunraku.ingest.jobs.scene",
     "bunraku.ingest.jobs.performers",
+    "bunraku.ingest.jobs.performance",
 )
 
 
@@ -79,6 +81,13 @@ _FAILURE_TEXTS: dict[JobKind, _FailureTexts] = {
         "combining these motions crashed",
         "please report it",
     ),
+    JobKind.PERFORMANCE: _FailureTexts(
+        "Too much motion",
+        "perform for a shorter time",
+        "Unreadable motion",
+        "encoding this performance crashed",
+        "please report it",
+    ),
 }
 
 
@@ -108,6 +117,7 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
     """Call the function of a job, in the worker process."""
     from bunraku.ingest.jobs.audio import add_audio
     from bunraku.ingest.jobs.motion import encode_file
+    from bunraku.ingest.jobs.performance import encode_performance
     from bunraku.ingest.jobs.performers import combine_performers
     from bunraku.ingest.jobs.recording import encode_recording
     from bunraku.ingest.jobs.scene import add_scene_of_body
@@ -118,5 +128,6 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
         JobKind.AUDIO: add_audio,
         JobKind.SCENE: add_scene_of_body,
         JobKind.PERFORMERS: combine_performers,
+        JobKind.PERFORMANCE: encode_performance,
     }
     return functions[kind](*arguments)

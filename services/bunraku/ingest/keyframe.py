@@ -11,8 +11,8 @@ from bunraku.codec.scene import MAX_FIELD_OF_VIEW_RAD, MIN_FIELD_OF_VIEW_RAD
 from bunraku.http.large_body import BodySource, read_body
 from bunraku.http.problem_details import validation_problem
 from bunraku.http.structured_body import BodyStructure, decode_json
-from bunraku.ingest.motion_id import derive_digest
 from bunraku.runtime.problem import ProblemError
+from bunraku.storage.motion_id import derive_digest
 
 MAX_KEYFRAMES = 10_000
 """Maximum number of keyframes of one camera or light."""

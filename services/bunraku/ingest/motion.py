@@ -8,7 +8,6 @@ from pathlib import Path, PurePath
 
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.job_queue import JobDetails, UploadJob
-from bunraku.ingest.motion_id import derive_job_id, derive_motion_id
 from bunraku.ingest.persistence import StoreOutcome, store_motion
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.result import require_result
@@ -16,6 +15,7 @@ from bunraku.ingest.source_file import SourceFile, clean_filename
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import clean_text
+from bunraku.storage.motion_id import derive_job_id, derive_motion_id
 
 
 def create_motion_job(digest: bytes, filename: str, subject: str) -> UploadJob:

@@ -13,13 +13,13 @@ from bunraku.http.admission import AdmissionLimit
 from bunraku.http.problem_details import invalid_field_problem
 from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
 from bunraku.ingest.job_process import JobKind
-from bunraku.ingest.motion_id import derive_digest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.motion.placement import Placement
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import MAX_NAME_CHARACTERS, clean_text
+from bunraku.storage.motion_id import derive_digest
 from bunraku.storage.record import CatalogueEntry
 from bunraku.wire.limbs import MAX_PERFORMERS
 

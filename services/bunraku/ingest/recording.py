@@ -15,7 +15,6 @@ from bunraku.http.admission import AdmissionLimit
 from bunraku.http.problem_details import validation_problem
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_process import JobKind
-from bunraku.ingest.motion_id import derive_motion_id
 from bunraku.ingest.persistence import check_quota, store_motion
 from bunraku.ingest.result import JobResult, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
@@ -29,6 +28,7 @@ from bunraku.messaging.recording_request import (
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import clean_text
 from bunraku.runtime.problem import ProblemError
+from bunraku.storage.motion_id import derive_motion_id
 from bunraku.storage.record import CatalogueEntry
 
 MAX_ACTIVE_RECORDINGS = 8

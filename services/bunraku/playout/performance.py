@@ -17,6 +17,8 @@ from bunraku.motion.easing import minimum_jerk
 from bunraku.motion.skeleton import JOINT_COUNT, Figure
 from bunraku.playout.block_store import Pose
 from bunraku.playout.delay import PlayoutDelay
+from bunraku.playout.overlay_buffer import RADIANS_PER_UNIT
+from bunraku.wire.live import Sample
 
 ON_TIME_QUANTILE = 0.99
 """Share of the samples that must arrive before the poses that need them: a few in a hundred are lost on the way."""
@@ -48,15 +50,19 @@ class SampleOutcome(Enum):
 class Performance:
     """Samples of one live performer, and the pose that they give."""
 
-    def __init__(self, figure: Figure, fps: float) -> None:
-        """Expect about `fps` samples per second; until the first one the figure is in its rest pose at the origin."""
+    def __init__(self, figure: Figure, fps: float, *, starts_at_rest: bool = True) -> None:
+        """Expect about `fps` samples per second.
+
+        Until the first one the figure is in its rest pose at the origin, from which it goes to the pose of the samples;
+        unless it `starts_at_rest`, the first pose is that of the first sample.
+        """
         self._times: list[int] = []
         self._samples: list[Pose] = []
         self._delay = PlayoutDelay(1e6 / fps + INITIAL_LATENESS_US, ON_TIME_QUANTILE)
         self._rest_height = float(figure.offsets[0, 1])
         self._rest_rotations = np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
         self._shown: Pose = np.array([0.0, self._rest_height, 0.0]), self._rest_rotations
-        self._is_silent = True
+        self._is_silent = starts_at_rest
         self._silent_since = -(HOLD_US + FADE_US)
         self._transition_from = self._shown
         self._returning_since: int | None = None
@@ -148,3 +154,20 @@ def _blend(start: Pose, end: Pose, share: float) -> Pose:
         start[0] + share * (end[0] - start[0]),
         rotation.slerp(start[1], end[1], np.full(JOINT_COUNT, share)),
     )
+
+
+def pack_sample(sampled: int, pose: Pose, sequence: int = 0) -> Sample:
+    """Return the sample of a pose that was captured at clock time `sampled`.
+
+    The pose is the root (3,) in metres and unit quaternions (18, 4).
+    """
+    root, rotations = pose
+    units = np.round(rotation.to_rotation_vector(rotations) / RADIANS_PER_UNIT).astype(int)
+    x, y, z = root
+    return Sample(sequence, sampled, (float(x), float(y), float(z)), tuple(units.ravel().tolist()))
+
+
+def sample_pose(sample: Sample) -> Pose:
+    """Return the pose of a sample."""
+    vectors = np.reshape(sample.rotations, (JOINT_COUNT, 3)) * RADIANS_PER_UNIT
+    return np.array(sample.root), rotation.from_rotation_vector(vectors)

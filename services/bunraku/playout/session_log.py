@@ -1,10 +1,10 @@
-"""Log of what the viewers of a session saw: its timelines and the overlays of its limbs.
+"""Log of what the viewers of a session saw: its timelines, the overlays of its limbs and the poses of live performers.
 
-The overlays are the messages that the stage published, so a replay gives the poses of the viewers to the last bit. The
+The latter are the messages that the stage published, so a replay gives the poses of the viewers to the last bit. The
 log covers the last `LOG_DURATION_US`, the longest recording with a margin; what is older is dropped.
 
-As bytes: "bunraku.log/3", then a msgpack map with `timelines`, a list of messages, and `overlays`, messages with their
-lengths (u16) before them.
+As bytes: "bunraku.log/3", then a msgpack map with `timelines`, a list of messages, and `overlays`, Overlay and Live
+messages with their lengths (u16) before them.
 """
 
 from __future__ import annotations
@@ -18,15 +18,17 @@ from typing import Self
 import msgpack
 
 from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.live import Live
 from bunraku.wire.messages import TimelineState, unpack
 from bunraku.wire.overlay import Overlay
 
 MAGIC = b"bunraku.log/3"
 LOG_DURATION_US = 660_000_000
 CHUNK_DURATION_US = 10_000_000
-"""Overlays are dropped in chunks of this duration."""
-MAX_LOG_BYTES = 16 << 20
-"""Bound of the overlays: sixteen controlled limbs at the full frame rate have 12 MB in `LOG_DURATION_US`."""
+"""Messages are dropped in chunks of this duration."""
+MAX_LOG_BYTES = 20 << 20
+"""Bound of the messages: in `LOG_DURATION_US`, sixteen controlled limbs at the full frame rate have 12 MB, four live
+performers 7 MB."""
 MAX_TIMELINES = 10_000
 
 _LENGTH = struct.Struct("<H")
@@ -38,7 +40,7 @@ class CorruptSessionLog(ValueError):
 
 @dataclass(slots=True)
 class _Chunk:
-    """Overlays of some seconds, the first of which is due at `begin_us`."""
+    """Messages of some seconds, the first of which is due at `begin_us`."""
 
     begin_us: int
     end_us: int
@@ -46,12 +48,12 @@ class _Chunk:
 
 
 class SessionLog:
-    """Timelines and overlays of a session; times are clock times in microseconds."""
+    """Timelines and messages of a session; times are clock times in microseconds."""
 
     def __init__(self) -> None:
         self.timelines: deque[TimelineState] = deque(maxlen=MAX_TIMELINES)
         self._chunks: deque[_Chunk] = deque()
-        self._overlay_bytes = 0
+        self._message_bytes = 0
 
     @property
     def motions(self) -> tuple[str, ...]:
@@ -63,26 +65,26 @@ class SessionLog:
         self.timelines.append(state)
         self._drop_before(state.clock - LOG_DURATION_US)
 
-    def add_overlay(self, due_us: int, message: bytes) -> None:
-        """Add a published Overlay, whose last frame is due at `due_us`; due times ascend."""
+    def add_message(self, due_us: int, message: bytes) -> None:
+        """Add a published Overlay or Live message, whose last frame is due at `due_us`; due times ascend."""
         if not self._chunks or due_us - self._chunks[-1].begin_us >= CHUNK_DURATION_US:
             self._chunks.append(_Chunk(due_us, due_us))
             self._drop_before(due_us - LOG_DURATION_US)
         chunk = self._chunks[-1]
         chunk.end_us = due_us
         chunk.messages += _LENGTH.pack(len(message)) + message
-        self._overlay_bytes += _LENGTH.size + len(message)
-        while self._overlay_bytes > MAX_LOG_BYTES:
+        self._message_bytes += _LENGTH.size + len(message)
+        while self._message_bytes > MAX_LOG_BYTES:
             self._drop_chunk()
 
-    def overlays(self, begin_us: int = 0) -> Iterator[Overlay]:
-        """Yield the overlays in order, without those of chunks that end before `begin_us`.
+    def messages(self, begin_us: int = 0) -> Iterator[Overlay | Live]:
+        """Yield the messages in order, without those of chunks that end before `begin_us`.
 
         Raises `CorruptSessionLog`.
         """
         for chunk in self._chunks:
             if chunk.end_us >= begin_us:
-                yield from _unpack_overlays(chunk.messages)
+                yield from _unpack_messages(chunk.messages)
 
     def pack(self, begin_us: int = 0) -> bytes:
         """Return the log as bytes, without what viewers saw before `begin_us`."""
@@ -98,7 +100,7 @@ class SessionLog:
 
     @classmethod
     def unpack(cls, data: bytes) -> Self:
-        """Parse a log; raises `CorruptSessionLog`. Its overlays are parsed by `overlays`."""
+        """Parse a log; raises `CorruptSessionLog`. Its messages are parsed by `messages`."""
         if not data.startswith(MAGIC):
             raise CorruptSessionLog(f"session log rejected: it does not begin with {MAGIC.decode()}")
         log = cls()
@@ -121,18 +123,20 @@ class SessionLog:
             self.timelines.popleft()
 
     def _drop_chunk(self) -> None:
-        self._overlay_bytes -= len(self._chunks.popleft().messages)
+        self._message_bytes -= len(self._chunks.popleft().messages)
 
 
-def _unpack_overlays(messages: bytes | bytearray) -> Iterator[Overlay]:
+def _unpack_messages(messages: bytes | bytearray) -> Iterator[Overlay | Live]:
     at, end = 0, len(messages)
     while at < end:
         try:
             (length,) = _LENGTH.unpack_from(messages, at)
-            overlay = unpack(bytes(messages[at + _LENGTH.size : at + _LENGTH.size + length]))
+            message = unpack(bytes(messages[at + _LENGTH.size : at + _LENGTH.size + length]))
         except (struct.error, MalformedMessage) as error:
-            raise CorruptSessionLog(f"session log rejected: overlay at byte {at}: {error}") from error
-        if not isinstance(overlay, Overlay):
-            raise CorruptSessionLog(f"session log rejected: the message at byte {at} is not an overlay")
-        yield overlay
+            raise CorruptSessionLog(f"session log rejected: message at byte {at}: {error}") from error
+        if not isinstance(message, Overlay | Live):
+            raise CorruptSessionLog(
+                f"session log rejected: the message at byte {at} shows neither limbs nor performers"
+            )
+        yield message
         at += _LENGTH.size + length

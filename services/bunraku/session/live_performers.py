@@ -2,28 +2,30 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
+from bunraku.codec.container import StoredMotion
 from bunraku.codec.live import LiveEncoder
 from bunraku.codec.motion_track import MotionTrack
-from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import JOINT_COUNT
 from bunraku.playout.block_store import Pose
-from bunraku.playout.overlay_buffer import RADIANS_PER_UNIT
-from bunraku.playout.performance import Performance, SampleOutcome
+from bunraku.playout.performance import Performance, SampleOutcome, sample_pose
+from bunraku.session.cast import Cast, CastMember
 from bunraku.wire.live import Live, LiveBlock, Sample
 
 
 class LivePerformer:
     """One live performer, on the track of a motion that shows its figure at rest."""
 
-    def __init__(self, performer_id: str, track: MotionTrack, fps: float) -> None:
-        """Expect about `fps` samples per second."""
-        self.id = performer_id
-        self.performance = Performance(track.figure, fps)
+    def __init__(self, member: CastMember, track: MotionTrack) -> None:
+        self.member = member
+        self.performance = Performance(track.figure, member.fps)
+        self.outcomes: Counter[str] = Counter({outcome.value: 0 for outcome in SampleOutcome})
+        """Samples by outcome."""
         self._encoder = LiveEncoder(track.skeleton)
 
     def encode(self, poses: Sequence[Pose], due: int, frame_time: int) -> LiveBlock:
@@ -33,9 +35,9 @@ class LivePerformer:
 
     def receive(self, sample: Sample, now: int) -> SampleOutcome:
         """Add a sample that arrived at `now`."""
-        vectors = np.reshape(sample.rotations, (JOINT_COUNT, 3)) * RADIANS_PER_UNIT
-        pose = np.array(sample.root), rotation.from_rotation_vector(vectors)
-        return self.performance.add(sample.sampled, pose, now)
+        outcome = self.performance.add(sample.sampled, sample_pose(sample), now)
+        self.outcomes[outcome.value] += 1
+        return outcome
 
 
 class LivePerformers:
@@ -53,17 +55,27 @@ class LivePerformers:
         """True if the last message showed a performer."""
         return self._was_shown
 
-    def add(self, number: int, performer: LivePerformer) -> None:
-        """Add a performer, or replace the one with this number."""
-        self._performers[number] = performer
-
-    def remove(self, performer_id: str) -> None:
-        """Remove a performer."""
-        self._performers = {n: one for n, one in self._performers.items() if one.id != performer_id}
+    def assign(self, cast: Cast, motion: StoredMotion) -> None:
+        """Show the members of a cast on the last performers of a motion; nobody if it is not the cast motion."""
+        known = {performer.member.id: performer for performer in self}
+        members = cast.members if cast.motion == motion.id else ()
+        first = len(motion.performers) - len(members)
+        self._performers = {
+            number: known.get(member.id) or LivePerformer(member, motion.performers[number].track)
+            for number, member in enumerate(members, first)
+        }
 
     def find(self, performer_id: str) -> LivePerformer | None:
         """Return a performer by id, or None."""
-        return next((one for one in self if one.id == performer_id), None)
+        return next((one for one in self if one.member.id == performer_id), None)
+
+    def number_of(self, performer_id: str) -> int | None:
+        """Return the number of a performer on the stage, or None."""
+        return next((number for number, one in self._performers.items() if one.member.id == performer_id), None)
+
+    def presence(self) -> list[dict[str, Any]]:
+        """Return the entries of Presence."""
+        return [{"performer": n, "id": one.member.id, "name": one.member.name} for n, one in self._performers.items()]
 
     def poses_at(self, frame_time: int) -> dict[int, Pose]:
         """Return the poses to show for the frame of clock time `frame_time`; none for performers at rest."""

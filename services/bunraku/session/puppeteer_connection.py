@@ -12,7 +12,7 @@ from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.session.counters import RATE_LIMITED, SessionCounters
 from bunraku.session.notice_throttle import MAX_MESSAGES_PER_S, NoticeThrottle
 from bunraku.session.stage_endpoint import PUPPETEER_HEARTBEAT_S
-from bunraku.websocket.connection import CLOSED_CONNECTION, FrameLimit, WebSocketConnection
+from bunraku.websocket.connection import CLOSED_CONNECTION, BinaryListener, FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.heartbeat import Heartbeat
 from bunraku.websocket.subprotocol import POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
@@ -32,7 +32,7 @@ class PuppeteerStage(Protocol):
         """Send a puppeteer's message; None means that the puppeteer has left, no bytes are a heartbeat."""
 
 
-class PuppeteerConnection:
+class PuppeteerConnection(BinaryListener):
     """Listener of a puppeteer's WebSocket. Messages of the stage are queued until `open` is called."""
 
     def __init__(self, stage: PuppeteerStage, counters: SessionCounters, clock: Callable[[], int]) -> None:

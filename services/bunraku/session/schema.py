@@ -2,9 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+
+from bunraku.http.problem_details import invalid_field_problem
+from bunraku.marionette.limb_rig import ArmRig, Limb
+from bunraku.marionette.proportions import ProportionsError
+from bunraku.motion.placement import Placement
+from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, TIP_JOINTS, Figure
+from bunraku.runtime.problem import ProblemError
+
+MAX_BONE_M = 3.0
+"""Longest part of an offset or tip along one axis."""
 
 
 class NewSession(BaseModel):
@@ -24,3 +37,69 @@ class SessionEdit(BaseModel):
     position: Annotated[int | None, Field(ge=0, lt=1 << 53, description="microseconds")] = None
     loop: bool | None = None
     motion: Annotated[str | None, Field(max_length=64)] = None
+
+
+Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]
+
+
+class FigureLengths(BaseModel):
+    """Limb lengths of a performer in H-Anim's I-pose, metres: right-handed, y up, facing z, x to the left."""
+
+    model_config = ConfigDict(extra="forbid")
+    offsets: Annotated[
+        dict[str, Vector], Field(max_length=JOINT_COUNT, description="position of each joint from its parent, by name")
+    ]
+    tips: Annotated[
+        dict[str, Vector],
+        Field(max_length=len(TIP_JOINTS), description="tip of the hands, toes and head, from their joint, by name"),
+    ]
+
+    def to_figure(self) -> Figure:
+        """Return the figure; raise `ProblemError` (422) with the invalid field."""
+        offsets = self._table("offsets", self.offsets, JOINTS)
+        tips = self._table("tips", self.tips, [JOINTS[joint] for joint in TIP_JOINTS])
+        figure = Figure(offsets, tips)
+        try:
+            for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
+                ArmRig(figure, limb)
+        except ProportionsError as error:
+            detail = f"the arms of this figure cannot be controlled: {error}"
+            raise ProblemError(
+                422, "No puppet's arms", detail, field=f"figure.{error.field}", hint=error.hint
+            ) from None
+        return figure
+
+    @staticmethod
+    def _table(field: str, vectors: dict[str, list[float]], names: Sequence[str]) -> Array:
+        table = np.zeros((JOINT_COUNT, 3))
+        for name in names:
+            if name not in vectors:
+                raise invalid_field_problem(("figure", field), f"the joint {name} is missing")
+        for name, vector in vectors.items():
+            if name not in names:
+                raise invalid_field_problem(("figure", field), f"there is no joint {name[:40]!r} here")
+            if np.abs(vector).max() > MAX_BONE_M:
+                raise invalid_field_problem(("figure", field, name), f"a length exceeds {MAX_BONE_M:g} metres")
+            table[JOINTS.index(name)] = vector
+        return table
+
+
+class NewPerformer(BaseModel):
+    """Live performer to bring on a stage."""
+
+    model_config = ConfigDict(extra="forbid")
+    name: Annotated[str, Field(max_length=200)] = ""
+    fps: Annotated[FiniteFloat, Field(ge=10.0, le=240.0, description="samples per second")] = 60.0
+    figure: Annotated[FigureLengths | None, Field(description="by default a standard figure of 1.75 m")] = None
+    session: Annotated[str | None, Field(max_length=64, description="session to join; by default a new one")] = None
+    place: Annotated[
+        Vector | None,
+        Field(description="x and z, metres, and turn about y, radians, on the stage; by default the next free place"),
+    ] = None
+
+    def placement(self) -> Placement | None:
+        """Return the placement; raise `ProblemError` (422) for one beyond the stage."""
+        try:
+            return None if self.place is None else Placement.parse(self.place)
+        except ValueError as error:
+            raise invalid_field_problem(("place",), str(error)) from None

@@ -23,6 +23,8 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
+from bunraku.session.cast import Cast
+from bunraku.session.cast_store import CastStore
 from bunraku.session.counters import SessionCounters
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRecord, SessionRegistry
 from bunraku.session.stage import SessionStart, Stage, load_bend_tables
@@ -65,6 +67,7 @@ class SessionManager:
         self._reconnection = context.bus.on_reconnect(self._review_all)
         self._announced_reconnects = context.bus.reconnects
         self.counters = SessionCounters()
+        self.casts = CastStore(context.motion_store)
         self._solver = PYTHON_SOLVER
 
     def stage_proxy(self, session: str, subject: str | None = None) -> StageProxy:
@@ -73,7 +76,7 @@ class SessionManager:
 
     async def open_session(
         self,
-        motion: str,
+        motion: str | Cast,
         *,
         playing: bool = True,
         loop: bool = True,
@@ -82,7 +85,7 @@ class SessionManager:
     ) -> dict[str, Any]:
         """Open a session of `subject` (None: without a quota) and return it as the API shows it.
 
-        Raises `ProblemError`.
+        It plays a stored motion, or a cast with live performers. Raises `ProblemError`.
 
         With a given id, `session`, raises `RevisionConflict` of the store if any replica has a session with that id.
         """
@@ -91,21 +94,23 @@ class SessionManager:
         # before the motion is loaded: a refusal is cheap
         self._require_quota(subject, 1)
         self._limit_rate(subject)
-        stored = await self.load_motion(motion)
+        cast = motion if isinstance(motion, Cast) else Cast(motion)
+        stored = await self.load_cast(cast)
         await asyncio.to_thread(load_bend_tables, stored)
         self._require_quota(subject, 1)
         await self._make_room(subject or "")
-        now, session = self._context.clock(), session or secrets.token_hex(9)
-        state = timeline.start(motion, stored.first_track.duration_us, now, playing=playing, loop=loop)
+        now, session = self._context.clock(), session or create_session_id()
+        state = timeline.start(stored.id, stored.first_track.duration_us, now, playing=playing, loop=loop)
         self._pending[session] = subject
         try:
-            revision = await self._registry.create(session, SessionRecord(replica, now, state.pack(), subject or ""))
-            stage = await self._add_stage(SessionStart(session, stored, state, now, subject or ""), revision)
+            record = SessionRecord(replica, now, state.pack(), subject or "", cast)
+            revision = await self._registry.create(session, record)
+            stage = await self._add_stage(SessionStart(session, stored, state, now, subject or "", cast), revision)
         finally:
             self._pending.pop(session, None)
         await self._confirm_quota(session, subject, revision)
         self.counters.sessions["opened",] += 1
-        _log.info("session %s plays motion %s", session, motion)
+        _log.info("session %s plays motion %s", session, stored.id)
         return session_json(stage, now)
 
     @property
@@ -137,15 +142,17 @@ class SessionManager:
         found = [one for one in await asyncio.gather(*descriptions, return_exceptions=True) if isinstance(one, dict)]
         return found, ids[first + limit] if first + limit < len(ids) else None
 
-    async def load_motion(self, motion: str) -> StoredMotion:
-        """Return a motion; raises `ProblemError` if it does not exist."""
-        stored = await self._context.motion_store.get(motion)
+    async def load_cast(self, cast: Cast) -> StoredMotion:
+        """Return the motion of a cast; raises `ProblemError` if it does not exist."""
+        if cast.members:
+            return await self.casts.load(cast)
+        stored = await self._context.motion_store.get(cast.base)
         if stored is None:
-            raise ProblemError(404, "No such motion", f"there is no motion {motion[:40]!r}", field="motion")
+            raise ProblemError(404, "No such motion", f"there is no motion {cast.base[:40]!r}", field="motion")
         return stored
 
-    async def save_record(self, stage: Stage, state: TimelineState) -> None:
-        """Save a stage with its next timeline.
+    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:
+        """Save a stage with its next timeline and cast.
 
         Raises `ProblemError` if the session has ended or another replica owns it now.
         """
@@ -155,7 +162,7 @@ class SessionManager:
                 # closed meanwhile; the session was taken over again, with another stage
                 raise _lost_problem(SessionLost(stage.id, has_ended=False))
             try:
-                record = SessionRecord(self._registry.replicas.id, stage.created, state.pack(), stage.subject)
+                record = SessionRecord(self._registry.replicas.id, stage.created, state.pack(), stage.subject, cast)
                 endpoint.revision = await self._registry.save(stage.id, record, endpoint.revision)
             except SessionLost as lost:
                 await self._close_stage(stage.id)
@@ -352,7 +359,8 @@ class SessionManager:
         confirmed = await self._registry.claim(session, claimed)
         if confirmed is None:
             return
-        start = SessionStart(session, stored, state, claimed.record.created_us, claimed.record.subject)
+        record = claimed.record
+        start = SessionStart(session, stored, state, record.created_us, record.subject, record.cast)
         (await self._add_stage(start, confirmed.revision)).announce()
         self.counters.sessions["taken over",] += 1
         _log.warning("session %s taken over from another server", session)
@@ -384,9 +392,14 @@ class SessionManager:
             await endpoint.close()
 
 
+def create_session_id() -> str:
+    """Return the id of a new session."""
+    return secrets.token_hex(9)
+
+
 def _record_of(stage: Stage) -> SessionRecord:
     """Return the record of a session without an owner."""
-    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject)
+    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject, stage.cast)
 
 
 def _lost_problem(lost: SessionLost) -> ProblemError:

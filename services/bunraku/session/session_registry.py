@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import msgpack
 
@@ -18,6 +18,7 @@ from bunraku.messaging.bus import Subscription
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, KeyValueStore, KeyValueView, RevisionConflict
 from bunraku.messaging.replica_registry import DEFAULT_TIMING, ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
+from bunraku.session.cast import EMPTY_CAST, Cast
 from bunraku.wire.messages import TimelineState, unpack
 
 MAX_OWN_CONFLICTS = 8
@@ -39,10 +40,20 @@ class SessionRecord(NamedTuple):
     """Timeline message."""
     subject: str = ""
     """Subject of the token that opened the session; empty without one, and in records of earlier releases."""
+    cast: Cast = EMPTY_CAST
+    """Live performers; none in records of earlier releases."""
 
     def pack(self) -> bytes:
-        """Return the fields as MessagePack; without a subject, replicas of earlier releases can read them."""
-        packed: bytes = msgpack.packb(tuple(self) if self.subject else tuple(self)[:3])
+        """Return the fields as MessagePack.
+
+        Without live performers and without a subject, replicas of earlier releases can read them.
+        """
+        fields: list[Any] = [self.owner, self.created_us, self.timeline]
+        if self.subject or self.cast.members:
+            fields.append(self.subject)
+        if self.cast.members:
+            fields.append(self.cast.to_values())
+        packed: bytes = msgpack.packb(fields)
         return packed
 
     @classmethod
@@ -51,7 +62,7 @@ class SessionRecord(NamedTuple):
         values = msgpack.unpackb(data)
         if not isinstance(values, list) or len(values) < 3:
             raise ValueError("not a record of a session")
-        record = cls(*values[:4])
+        record = cls(*values[:4], *map(Cast.from_values, values[4:5]))
         record.parse_timeline()
         return record
 

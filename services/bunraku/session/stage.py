@@ -29,6 +29,7 @@ from bunraku.playout.block_store import Pose
 from bunraku.playout.overlay_buffer import pack_overlay
 from bunraku.playout.performance import SampleOutcome
 from bunraku.playout.session_log import SessionLog
+from bunraku.session.cast import EMPTY_CAST, Cast
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.live_performers import LivePerformers
@@ -65,6 +66,8 @@ class SessionStart:
     """Clock time of the creation."""
     subject: str = ""
     """Subject of the token that opened the session."""
+    cast: Cast = EMPTY_CAST
+    """Live performers."""
 
 
 class Stage:
@@ -98,6 +101,7 @@ class Stage:
         self._sequence = 0
         self._phase_us = secrets.randbelow(FRAMES_PER_MESSAGE * FRAME_INTERVAL_US)
         self._last_overlay: bytes | None = None
+        self.cast = start.cast
         self.live = LivePerformers()
         self.log = SessionLog()
         self.log.add_timeline(self.timeline)
@@ -155,8 +159,8 @@ class Stage:
         return self.presence_publisher.last_change_us
 
     def is_idle(self, now: int, duration_us: int) -> bool:
-        """Return whether the session has had neither viewers nor puppeteers for `duration_us`."""
-        return self.participant_count == 0 and now - self.last_active_us >= duration_us
+        """Return whether the session has had neither viewers, puppeteers nor performers for `duration_us`."""
+        return self.participant_count == 0 and not self.cast.members and now - self.last_active_us >= duration_us
 
     @property
     def holders(self) -> tuple[str | None, ...]:
@@ -168,7 +172,8 @@ class Stage:
         """Viewer count, puppeteers, limb holders and requests for limbs."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         asks = [list(limb) for limb in self._ownership.asks()]
-        return Presence(self.presence_publisher.viewer_count, puppeteers, list(self.holders), asks)
+        live = self.live.presence() or None
+        return Presence(self.presence_publisher.viewer_count, puppeteers, list(self.holders), asks, live)
 
     def plan_edit(self, edit: SessionEdit, motion: StoredMotion | None) -> TimelineState | None:
         """Return the timeline after an edit, due `EDIT_LEAD_US` from now; None if the edit changes nothing.
@@ -182,17 +187,25 @@ class Stage:
             state = timeline.edit(state, due, playing=edit.playing, position=edit.position, loop=edit.loop)
         return state if state is not self.timeline else None
 
-    def apply_edit(self, state: TimelineState, motion: StoredMotion | None) -> None:
+    def apply_edit(self, state: TimelineState, motion: StoredMotion | None, cast: Cast) -> None:
         """Publish a timeline of `plan_edit`, and change the motion for everyone; limbs stay held.
 
-        Call `load_bend_tables` for a new `motion` before, as its first arm takes a tenth of a second.
+        `motion` is that of the `cast`. Call `load_bend_tables` for it before, as its first arm takes a tenth of a
+        second.
         """
-        before = self.holders
+        before, live_before = self.holders, self.live.presence()
         if motion is not None:
+            self.cast = cast
             self._change_motion(motion)
         self._publish_timeline(state)
-        if len(self.holders) != len(before):
+        if len(self.holders) != len(before) or self.live.presence() != live_before:
             self.presence_publisher.publish()
+
+    def change_cast(self, cast: Cast) -> None:
+        """Show other live performers on the present motion."""
+        self.cast = cast
+        self.live.assign(cast, self._motion)
+        self.presence_publisher.publish()
 
     def _change_motion(self, motion: StoredMotion) -> None:
         now = self._clock()
@@ -294,7 +307,9 @@ class Stage:
         return changed
 
     def _set_motion(self, motion: StoredMotion) -> None:
+        self._motion = motion
         self._pose_cache = PoseCache(motion, self._timelines)
+        self.live.assign(self.cast, motion)
 
     def _publish_timeline(self, state: TimelineState) -> None:
         self._timelines.put(state)
@@ -378,12 +393,13 @@ class Stage:
             frame_overlays.append(overlay)
         due = self._frame_time_us(frames[-1]) + OVERLAY_LEAD_US
         if (live := self.live.pack(due, self._frame_time_us(frames[-1]), live_frames)) is not None:
+            self.log.add_message(due, live)
             self._bus.publish(f"session.{self.id}.live", live)
         if not self._ownership.is_at_rest or self._last_overlay is not None:
             self._sequence += 1
             message = pack_overlay(self._sequence, due, frame_overlays)
             self._last_overlay = message if frame_overlays[-1] else None
-            self.log.add_overlay(due, message)
+            self.log.add_message(due, message)
             self._bus.publish(f"session.{self.id}.overlay", message)
         self._counters.tick_duration_s.observe(time.perf_counter() - begin_s)
         return not self._ownership.is_at_rest or self.live.is_shown

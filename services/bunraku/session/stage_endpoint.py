@@ -3,7 +3,8 @@
 On `session.{id}.` it responds to the requests `describe`, `edit`, `log`, `end` and `join` with MessagePack: the answer
 as the API shows it, or `{"problem": ...}`. Puppeteers publish their messages on `said` as `[puppeteer, message]`; None
 means that the puppeteer has left, and an empty message is a heartbeat. Messages to a puppeteer are published on
-`told.{puppeteer}`; an empty one means that the stage does not know the puppeteer.
+`told.{puppeteer}`; an empty one means that the stage does not know the puppeteer. Live performers have requests and
+messages of their own (`bunraku.session.performer_endpoint`).
 """
 
 from __future__ import annotations
@@ -25,10 +26,13 @@ from bunraku.playout.timeline import position_at
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.problem import ProblemError
+from bunraku.session.cast import EMPTY_CAST, Cast
+from bunraku.session.cast_store import CastStore
+from bunraku.session.performer_endpoint import PerformerEndpoint
 from bunraku.session.puppeteer_input import PuppeteerInput
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit
-from bunraku.session.stage import Stage, load_bend_tables
+from bunraku.session.stage import EDIT_LEAD_US, Stage, load_bend_tables
 from bunraku.wire.messages import TimelineState
 
 PUPPETEER_HEARTBEAT_S = 2.0
@@ -48,12 +52,14 @@ class StageOwner(Protocol):
 
     input_scheduler: InputScheduler
     """Turns of the puppeteers of all stages."""
+    casts: CastStore
+    """Motions of the casts of all stages."""
 
-    async def load_motion(self, motion: str) -> StoredMotion:
-        """Return a motion; raises `ProblemError`."""
+    async def load_cast(self, cast: Cast) -> StoredMotion:
+        """Return the motion of a cast; raises `ProblemError`."""
 
-    async def save_record(self, stage: Stage, state: TimelineState) -> None:
-        """Save a stage with its next timeline, so that another replica can continue it."""
+    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:
+        """Save a stage with its next timeline and cast, so that another replica can continue it."""
 
     async def end_session(self, session: str) -> None:
         """End a session."""
@@ -76,18 +82,21 @@ class StageEndpoint:
         self._subject = f"session.{stage.id}"
         self._inputs: dict[str, PuppeteerInput] = {}
         self._join_rate = KeyedTokenBuckets(JOINS_PER_S, JOIN_BURST)
+        self._performers = PerformerEndpoint(stage, context, self, owner.casts)
         bus = context.bus
+        operations: dict[str, Callable[[Any], Awaitable[Any]]] = {
+            "describe": self._answer_describe,
+            "edit": self._answer_edit,
+            "log": self._answer_log,
+            "end": self._answer_end,
+            "join": self._answer_join,
+            **self._performers.operations,
+        }
         self._subscriptions: list[Subscription] = [
             bus.subscribe(f"{self._subject}.said", self._receive),
             *(
                 bus.serve(f"{self._subject}.{operation}", self._make_responder(operation, handler))
-                for operation, handler in (
-                    ("describe", self._answer_describe),
-                    ("edit", self._answer_edit),
-                    ("log", self._answer_log),
-                    ("end", self._answer_end),
-                    ("join", self._answer_join),
-                )
+                for operation, handler in operations.items()
             ),
         ]
         self._sweep_task = asyncio.create_task(self._expire_participants(), name=f"participants of {stage.id}")
@@ -100,6 +109,7 @@ class StageEndpoint:
         await asyncio.wait((self._sweep_task,))
         # its exception refers to this object: without the reference both are freed at once
         del self._sweep_task
+        await self._performers.close()
         for puppeteer in self.stage.puppeteers:
             puppeteer.send(b"")
         await self.stage.close()
@@ -125,18 +135,44 @@ class StageEndpoint:
         return session_json(self.stage, self._clock())
 
     async def _answer_edit(self, values: dict[str, Any]) -> dict[str, Any]:
-        edit, stage = SessionEdit.model_validate(values), self.stage
+        edit = SessionEdit.model_validate(values)
         async with self._edit_lock:
-            motion = None
-            if edit.motion is not None and edit.motion != stage.timeline.motion:
-                motion = await self._owner.load_motion(edit.motion)
-                await asyncio.to_thread(load_bend_tables, motion)
-            state = stage.plan_edit(edit, motion)
-            # saved before it is shown: a server that takes over continues what viewers have seen
-            await self._owner.save_record(stage, state or stage.timeline)
-            if state is not None:
-                stage.apply_edit(state, motion)
-        return session_json(stage, self._clock())
+            cast = self.stage.cast
+            if edit.motion is not None and edit.motion != self.stage.timeline.motion:
+                # live performers stay beside the performers of another motion
+                cast = Cast(edit.motion, cast.members)
+            await self._apply_edit(edit, cast)
+        return session_json(self.stage, self._clock())
+
+    async def change_motion(self, motion: str) -> None:
+        """Save another motion, then show it."""
+        async with self._edit_lock:
+            await self._apply_edit(SessionEdit(), Cast(motion, self.stage.cast.members))
+
+    async def change_cast(self, cast: Cast) -> None:
+        """Save a cast, then show it; its motion goes on where it is."""
+        async with self._edit_lock:
+            if not cast.motion:
+                # nothing else to play: the figure of the last performer stays, at rest
+                await self._owner.save_record(self.stage, self.stage.timeline, EMPTY_CAST)
+                self._performers.replace(self.stage.cast)
+                self.stage.change_cast(EMPTY_CAST)
+                return
+            position = position_at(self.stage.timeline, self._clock() + EDIT_LEAD_US)
+            await self._apply_edit(SessionEdit(position=position), cast)
+
+    async def _apply_edit(self, edit: SessionEdit, cast: Cast) -> None:
+        stage, motion = self.stage, None
+        if cast.motion and cast.motion != stage.timeline.motion:
+            motion = await self._owner.load_cast(cast)
+            await asyncio.to_thread(load_bend_tables, motion)
+        state = stage.plan_edit(edit, motion)
+        # saved before it is shown: a server that takes over continues what viewers have seen
+        await self._owner.save_record(stage, state or stage.timeline, cast)
+        if state is not None:
+            if motion is not None and stage.cast.members:
+                self._performers.replace(stage.cast)
+            stage.apply_edit(state, motion, cast)
 
     async def _answer_log(self, seconds: float | None) -> dict[str, Any]:
         stage, end = self.stage, self._clock()
@@ -148,7 +184,9 @@ class StageEndpoint:
         return {"log": name, "begin": begin, "end": end}
 
     async def _answer_end(self, _: None) -> None:
+        self._performers.end_all()
         await self._owner.end_session(self.stage.id)
+        await self._performers.remove_motions()
 
     async def _answer_join(self, values: list[Any]) -> dict[str, Any]:
         # replicas of earlier releases send no subject
@@ -190,6 +228,8 @@ class StageEndpoint:
             # while the event loop was blocked, no heartbeat could be received
             stalled_us = max(now - begin - round(PUPPETEER_HEARTBEAT_S * 1e6), 0)
             self.stage.presence_publisher.expire_viewer_counts(VIEWER_COUNT_TIMEOUT_US, stalled_us)
+            self._performers.expire(stalled_us)
+            await self._performers.maintain()
             for puppeteer in self.stage.puppeteers:
                 puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:

@@ -10,10 +10,13 @@ from bunraku.http.problem_details import session_not_found
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.runtime.problem import ProblemError
+from bunraku.session.cast import Cast, CastMember
 from bunraku.session.schema import SessionEdit
 
 LOG_TIMEOUT_S = 10.0
 """Timeout for storing a log of some megabytes."""
+CAST_TIMEOUT_S = 20.0
+"""Timeout for making the motion of a changed cast, and for storing the last samples of a performer."""
 
 
 class Puppeteer(Protocol):
@@ -68,6 +71,35 @@ class StageProxy:
     def send(self, puppeteer: Puppeteer, message: bytes | None) -> None:
         """Publish a puppeteer's message; None means that the puppeteer has left, no bytes are a heartbeat."""
         self._bus.publish(f"{self._subject}.said", msgpack.packb([puppeteer.id, message]))
+
+    # live performers
+
+    async def perform(self, member: CastMember) -> dict[str, Any]:
+        """Add a live performer, whose figure is stored, and return it as the API shows it."""
+        (values,) = Cast("", (member,)).to_values()[1]
+        answer: dict[str, Any] = await self._request("perform", values, CAST_TIMEOUT_S)
+        return answer
+
+    async def describe_performer(self, performer: str) -> dict[str, Any]:
+        """Return a live performer as the API shows it; raise `ProblemError` 404 if there is none."""
+        answer: dict[str, Any] = await self._request("performer", performer)
+        return answer
+
+    async def attach_performer(self, performer: str, connection: str) -> None:
+        """Make a connection that of a performer. Subscribe to `performer_subject` first."""
+        await self._request("attach", [performer, connection])
+
+    async def end_performer(self, performer: str) -> None:
+        """End a performance."""
+        await self._request("unperform", performer, CAST_TIMEOUT_S)
+
+    def performer_subject(self, performer: str) -> str:
+        """Return the subject on which the connections of a performer are told which is current."""
+        return f"{self._subject}.performer.{performer}"
+
+    def send_sample(self, performer: str, connection: str, message: bytes | None) -> None:
+        """Publish a packed Sample; no bytes are a heartbeat, None means that the connection has ended."""
+        self._bus.publish(f"{self._subject}.sample", msgpack.packb([performer, connection, message]))
 
     async def _request(self, operation: str, payload: Any, timeout_s: float = 2.0) -> Any:
         not_found = session_not_found(self._session)

@@ -1,6 +1,7 @@
 """Store of encoded motions: immutable objects in a folder or an object store.
 
-The store also holds the uploaded files and session logs of pending jobs, and notes that replicas share.
+The store also holds the uploaded files and session logs of pending jobs, the samples of live performances, and notes
+that replicas share.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from bunraku.codec.errors import DamagedBlock
 from bunraku.runtime.clock import clock
 from bunraku.storage.object_folder import StoredObject
 from bunraku.storage.object_storage import ObjectStorage
+from bunraku.storage.performance_store import PerformanceStore
 from bunraku.storage.record import is_motion_id
 
 MAX_CACHE_BYTES = 64 << 20
@@ -24,7 +26,7 @@ MAX_CACHE_BYTES = 64 << 20
 MAX_CACHE_IDLE_US = 600_000_000
 """Time after its last request until a motion leaves the cache, microseconds. Without it the cache grows for days on a
 server on which each motion is requested a few times: 100 motions of 2 s take 1.3 MB."""
-OBJECT_FOLDERS = ("motions", "sources", "logs", "notes")
+OBJECT_FOLDERS = ("motions", "sources", "logs", "performances", "notes")
 _MOTION_SUFFIX = ".bunraku"
 _LOG_NAME_PATTERN = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -45,6 +47,7 @@ class MotionStore:
         # cached motions and the times of their last requests, the oldest first
         self._cache: OrderedDict[str, tuple[StoredMotion, int]] = OrderedDict()
         self._cached_bytes = 0
+        self.performances = PerformanceStore(objects)
 
     @classmethod
     def open(cls, url: str) -> MotionStore:
@@ -78,6 +81,12 @@ class MotionStore:
         stored = self._loaded.setdefault(motion_id, stored)
         self._cache_motion(stored)
         return stored
+
+    async def touch(self, motion_id: str) -> None:
+        """Store a motion again, if it exists: one that is not in the library is removed when it is old."""
+        packed = await self._objects.get(_motion_path(motion_id))
+        if packed is not None:
+            await self._objects.put(_motion_path(motion_id), packed)
 
     async def remove(self, motion_id: str) -> None:
         """Remove a motion if it exists."""

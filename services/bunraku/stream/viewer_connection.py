@@ -28,7 +28,7 @@ from bunraku.stream.quiet_period import QuietPeriod
 from bunraku.stream.send_queue import MAX_CONTROL_MESSAGES, SendQueue
 from bunraku.stream.sync_group import SEND_SPREAD_US, SyncGroups, SyncMembership
 from bunraku.stream.track_selection import ViewerOptions
-from bunraku.websocket.connection import CLOSED_CONNECTION, WebSocketConnection
+from bunraku.websocket.connection import CLOSED_CONNECTION, BinaryListener, WebSocketConnection
 from bunraku.websocket.frame import encode_frame, frame_payload
 from bunraku.websocket.heartbeat import Heartbeat
 from bunraku.websocket.subprotocol import INTERNAL_ERROR, POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
@@ -56,7 +56,7 @@ class ViewerGroup(Protocol):
         """Remove a viewer whose connection has ended."""
 
 
-class ViewerConnection:
+class ViewerConnection(BinaryListener):
     """Sending side of one viewer. Everything is queued until `open` is called."""
 
     __slots__ = (

@@ -45,11 +45,12 @@ class FrameLimit(NamedTuple):
     """Limit on the frames of one connection: so many per second, and so many at once.
 
     A client above it is disconnected. A read that completes no frame counts as one. Pongs that answer a Ping of this
-    side do not count.
+    side do not count. A message may have `max_bytes`.
     """
 
     rate: float
     burst: float
+    max_bytes: int = MAX_CLIENT_MESSAGE_BYTES
 
 
 VIEWER_FRAMES = FrameLimit(40.0, 120.0)
@@ -61,6 +62,9 @@ class ConnectionListener(Protocol):
 
     def on_message(self, message: bytes) -> None:
         """Handle a binary message. Raise `CloseConnection` to close the connection."""
+
+    def on_text(self, text: bytes) -> None:
+        """Handle a text message, which may not be UTF-8. Raise `CloseConnection` to close the connection."""
 
     def on_pong(self, payload: bytes) -> bool:
         """Handle a Pong with a payload. Return whether it answers a Ping."""
@@ -75,8 +79,21 @@ class ConnectionListener(Protocol):
         """Handle the end of the connection."""
 
 
+class BinaryListener:
+    """Base of listeners that accept binary messages only."""
+
+    __slots__ = ()
+
+    def on_text(self, text: bytes) -> None:  # noqa: ARG002
+        """Reject a text message."""
+        raise CloseConnection(POLICY_VIOLATION, "Text", "received a text message; messages are binary")
+
+
 class _NoListener:
     def on_message(self, message: bytes) -> None:
+        pass
+
+    def on_text(self, text: bytes) -> None:
         pass
 
     def on_pong(self, payload: bytes) -> bool:  # noqa: ARG002
@@ -142,13 +159,13 @@ class WebSocketConnection(asyncio.Protocol):
         self._connections = connections
         self._clock = clock
         self._input = scheduler or InputScheduler(TURN_US, clock)
-        self._parser = ClientFrameParser(MAX_CLIENT_MESSAGE_BYTES)
+        self._parser = ClientFrameParser(limit.max_bytes)
         self.source = peer_network(transport) if source is None else source
         self._close_timer: asyncio.TimerHandle | None = None
         self._write_deadline: WriteDeadline | None = None
         self.is_writable = True
         self.last_received_at = clock()
-        self._frames = TokenBucket(*limit, self.last_received_at * 1e-6)
+        self._frames = TokenBucket(limit.rate, limit.burst, self.last_received_at * 1e-6)
         self.on_ended: Callable[[], None] | None = None
         """Called once when the connection has ended, before `ConnectionListener.on_close`."""
         self.write = transport.write
@@ -267,7 +284,7 @@ class WebSocketConnection(asyncio.Protocol):
         elif opcode == Opcode.BINARY:
             self._listener.on_message(payload)
         elif opcode == Opcode.TEXT:
-            raise CloseConnection(POLICY_VIOLATION, "Text", "received a text message; messages are binary")
+            self._listener.on_text(payload)
         elif opcode == Opcode.PONG and payload and self._listener.on_pong(payload):
             self._frames.give_back()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +15,8 @@ MAX_LIVE_FRAMES = 16
 """Most frames of one message."""
 MAX_LIVE_BLOCK_BYTES = (1 << 14) - 1
 """Largest block of a performer: two bytes of LEB128."""
-SAMPLE_JOINTS = 18
+MAX_ROOT_M = 100.0
+"""Bound of each coordinate of a sample's root."""
 AGE_UNIT_US = 4_000
 """Unit in which the age of poses is sent."""
 MAX_AGE_US = 255 * AGE_UNIT_US
@@ -87,12 +87,13 @@ class Sample:
 
     @classmethod
     def unpack(cls, data: bytes) -> Sample:
-        """Decode a message; raises `MalformedMessage`, also for a position that is not finite."""
+        """Decode a message; raises `MalformedMessage`, also for a position beyond `MAX_ROOT_M`."""
         if len(data) != cls.LAYOUT.size:
             raise MalformedMessage(f"Sample has {len(data)} bytes, expected {cls.LAYOUT.size} bytes")
         _, sequence, sampled, x, y, z, *rotations = cls.LAYOUT.unpack(data)
-        if not all(map(math.isfinite, (x, y, z))):
-            raise MalformedMessage("Sample has a root position that is not finite")
+        # not finite numbers are not within the bound either
+        if not all(abs(coordinate) <= MAX_ROOT_M for coordinate in (x, y, z)):
+            raise MalformedMessage(f"Sample has a root position that is not within {MAX_ROOT_M:g} m")
         return cls(sequence, sampled, (x, y, z), tuple(rotations))
 
 

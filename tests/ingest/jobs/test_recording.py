@@ -94,7 +94,7 @@ def test_all_performers_are_recorded_with_their_overlays() -> None:
         assert poses is not None
         overlay = marionettes.compute_overlay([rotations for _, rotations in poses], now)
         limbs = {limb: pack_joints(joints) for limb, joints in overlay.items()}
-        log.add_overlay(now + 60_000, Overlay(frame, now + 60_000, limbs).pack())
+        log.add_message(now + 60_000, Overlay(frame, now + 60_000, limbs).pack())
     result = encode_recording(
         "recorded",
         RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 2 * SECOND_US),

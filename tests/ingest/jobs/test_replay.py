@@ -72,7 +72,7 @@ class SimulatedSession:
         self._sequence += 1
         published = Overlay(self._sequence, self.clock + OVERLAY_LEAD_US, limbs)
         self._viewer_overlays.put(published)
-        self.log.add_overlay(published.due, published.pack())
+        self.log.add_message(published.due, published.pack())
 
 
 def figures_of(motion: str) -> list[Figure]:

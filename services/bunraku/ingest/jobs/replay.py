@@ -1,17 +1,23 @@
-"""Replay of a session: the poses that viewers saw at any clock time, with overlays of controlled limbs."""
+"""Replay of a session: the poses that viewers saw at any clock time, of live performers and with controlled limbs."""
 
 from __future__ import annotations
 
+import contextlib
 from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping
 
 from bunraku.codec.container import PerformerTracks, StoredMotion
+from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.playout.block_store import MotionBlockStore, Pose
+from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US, OverlayBuffer
 from bunraku.playout.session_log import SessionLog
 from bunraku.playout.timeline import position_at
+from bunraku.wire.live import Live
 from bunraku.wire.messages import Data, TimelineState
+from bunraku.wire.overlay import Overlay
 
 OVERLAY_LEAD_US = 100_000
 """Lead time with which overlays are published before they are due, in microseconds: no viewer gets them earlier."""
@@ -39,13 +45,17 @@ class SessionReplay:
         return self._states[index - 1] if index else None
 
     def motion_poses_at(self, clock: int) -> list[Pose] | None:
-        """Return each performer's pose in the stored motion, None before the first timeline; raise `MissingMotion`."""
+        """Return each performer's live pose, or else its pose in the stored motion.
+
+        Return None before the first timeline; raise `MissingMotion`.
+        """
         state = self.timeline_at(clock)
         if state is None:
             return None
         position = position_at(state, clock)
         poses = (
-            performer.pose_at(position, state.loop, state.duration) for performer in self._performers_of(state.motion)
+            performer.live.pose_at(clock) or performer.pose_at(position, state.loop, state.duration)
+            for performer in self._performers_of(state.motion)
         )
         # never None, as every block is stored
         return [pose for pose in poses if pose is not None]
@@ -53,15 +63,18 @@ class SessionReplay:
     def replay_poses(self, times: Iterable[int]) -> Iterator[list[Pose] | None]:
         """Yield each performer's pose with overlays at ascending clock `times`, None before the first timeline.
 
-        Raise `MissingMotion`, and `CorruptSessionLog` for an overlay that cannot be read.
+        Raise `MissingMotion`, and `CorruptSessionLog` for a message that cannot be read.
         """
         overlays, logged, upcoming = OverlayBuffer(), None, None
         for clock in times:
             if logged is None:
-                logged = self._log.overlays(clock - OVERLAY_HOLD_US)
+                logged = self._log.messages(clock - OVERLAY_HOLD_US)
                 upcoming = next(logged, None)
             while upcoming is not None and upcoming.due <= clock + OVERLAY_LEAD_US:
-                overlays.put(upcoming)
+                if isinstance(upcoming, Overlay):
+                    overlays.put(upcoming)
+                else:
+                    self._put_live(upcoming)
                 upcoming = next(logged, None)
             poses = self.motion_poses_at(clock)
             yield (
@@ -69,6 +82,16 @@ class SessionReplay:
                 if poses is None
                 else [(root, overlays.apply(rotations, clock, index)) for index, (root, rotations) in enumerate(poses)]
             )
+
+    def _put_live(self, message: Live) -> None:
+        """Add live poses to the performers of the motion that is played when they are due."""
+        state = self.timeline_at(message.due)
+        performers = self._performers_by_motion.get(state.motion, []) if state is not None else []
+        for number, block in message.blocks.items():
+            # around a change of the motion, a message may show a performer of the other one
+            if number < len(performers):
+                with contextlib.suppress(DamagedBlock):
+                    performers[number].live.put(message.due, message.frames, block.data)
 
     def _performers_of(self, motion: str) -> list[_PerformerPlayback]:
         if motion not in self._performers_by_motion:
@@ -82,6 +105,7 @@ class _PerformerPlayback:
     def __init__(self, performer: PerformerTracks) -> None:
         self.track, self._packets = performer.track, performer.packets[-1]
         self._store = MotionBlockStore(performer.track)
+        self.live = LiveBuffer(LiveTrack(performer.track.skeleton))
 
     def pose_at(self, position: int, loop: bool, duration: int) -> Pose | None:
         index = self.track.block_at(position)
