@@ -161,8 +161,9 @@ def check_archive(poses: list[Pose], sent: dict[int, Pose]) -> None:
     expected = np.stack([np.interp(grid, times, column) for column in flat.T], axis=-1).reshape(len(grid), -1, 3)
     archived = np.array([joint_and_tip_positions(figure, *pose) for pose in poses])
     errors = np.linalg.norm(archived - expected, axis=-1) * 1e3
-    assert errors.mean() < 3.0
+    # where the sender was suspended for longer, the figure stands still
     assert np.median(errors) < 1.0
+    assert np.median(errors[-1]) < 1.0
 
 
 async def test_performer_joins_a_running_dance_and_leaves_it(tmp_path: Path, clip_file: Path) -> None:
