@@ -3,6 +3,7 @@ import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { findViolations } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
+import { createEmbeddingPage } from "./embedding-page";
 import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import { danceAt, startPerformer } from "./live-performer";
 import {
@@ -129,6 +130,25 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
     await badge.waitFor({ state: "hidden" });
     await waitForPerformers(page, 1);
     expect(await evaluateInEngine(page, () => globalThis.bunraku.viewer.damagedCount)).toBe(0);
+  });
+
+  test("an embedded stage shows a live performer, also one who was there before", async () => {
+    const performer = await startPerformer(fixture, "Ben", [1, 0, 0]);
+    const stage = `<bunraku-stage src="${fixture.url}/?session=${fixture.session}" style="width: 420px"></bunraku-stage>`;
+    const html = createEmbeddingPage(stage, fixture.url);
+    const page = await fixture.open(fixture.site.origin + (await fixture.publish(html)));
+    await page.waitForFunction(() => {
+      const { viewer, stage } = document.querySelector("bunraku-stage")!;
+      const [live] = viewer?.presence?.live ?? [];
+      const pose = viewer?.poseAt(performance.now(), 1);
+      // the left shoulder of the dance, which at rest hangs down
+      return live?.name === "Ben" && stage?.performers[1]?.group.visible && pose && pose.rotations[12 * 4] < 0.98;
+    });
+    await performer.end();
+    await page.waitForFunction(() => {
+      const { viewer, stage } = document.querySelector("bunraku-stage")!;
+      return viewer?.presence?.live === null && stage?.performers.length === 1;
+    });
   });
 
   test("the guide has the command for this session", async () => {
