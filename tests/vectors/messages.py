@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import struct
 from typing import Any
 
 import msgpack
@@ -185,6 +186,7 @@ def make_vectors() -> dict[str, Any]:
         "sample too short": sample[:-1],
         "sample too long": sample + b"\0",
         "sample with a position that is not a number": sample[:16] + b"\x00\x00\xc0\x7f" + sample[20:],
+        "sample with a position of more than 100 m": sample[:20] + struct.pack("<f", -100.5) + sample[24:],
         "sample with an infinite position": sample[:24] + b"\x00\x00\x80\xff" + sample[28:],
         "pong too long": Pong(1, 2, 3, 4).pack() + b"\0",
         "bytes after the map": Claim(0).pack() + b"\0",

@@ -4,7 +4,7 @@ from hypothesis import strategies as st
 
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.limbs import MAX_PERFORMERS
-from bunraku.wire.live import AGE_UNIT_US, MAX_LIVE_FRAMES, Live, LiveBlock, Sample
+from bunraku.wire.live import AGE_UNIT_US, MAX_LIVE_FRAMES, MAX_ROOT_M, Live, LiveBlock, Sample
 
 lives = st.builds(
     Live,
@@ -15,12 +15,12 @@ lives = st.builds(
         st.builds(LiveBlock, st.integers(0, 255).map(lambda age: age * AGE_UNIT_US), st.binary(max_size=300)),
     ),
 )
-floats = st.floats(width=32, allow_nan=False, allow_infinity=False)
+coordinates = st.floats(-MAX_ROOT_M, MAX_ROOT_M, width=32)
 samples = st.builds(
     Sample,
     sequence=st.integers(0, 2**32 - 1),
     sampled=st.integers(0, 2**53 - 1),
-    root=st.tuples(floats, floats, floats),
+    root=st.tuples(coordinates, coordinates, coordinates),
     rotations=st.tuples(*[st.integers(-32_768, 32_767)] * 54),
 )
 
@@ -62,10 +62,10 @@ def test_sample_round_trip(sample: Sample) -> None:
     assert Sample.unpack(packed) == sample
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_sample_of_a_position_that_is_not_finite_is_rejected(value: float) -> None:
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -100.5])
+def test_sample_of_a_position_beyond_the_bound_is_rejected(value: float) -> None:
     packed = Sample(1, 2, (0.0, value, 0.0), (0,) * 54).pack()
-    with pytest.raises(MalformedMessage, match="not finite"):
+    with pytest.raises(MalformedMessage, match="not within 100 m"):
         Sample.unpack(packed)
     with pytest.raises(MalformedMessage, match="expected 136 bytes"):
         Sample.unpack(packed[:-1])

@@ -6,6 +6,7 @@ import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
 import { isAvatarFile } from "../ui/library/avatar-chooser";
+import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem, uploadAll } from "../ui/library/upload";
 import type { Page, UserActions } from "../ui/page";
 import type { ThemeChoice } from "../ui/theme";
@@ -80,7 +81,9 @@ export function createUserActions(app: AppParts): UserActions {
     reframe: () => app.stageHost.resize(),
     labels: (metrics) => app.stageHost.setLabels(metrics),
     mappingShown: () => app.stageHost.pollGamepad(),
-    ...(pageAccess.allows("ingest") ? { keep: createPageRecordAction(app) } : {}),
+    ...(pageAccess.allows("ingest")
+      ? { keep: createPageRecordAction(app), captureTarget: () => captureTarget(app.playback) }
+      : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
           add: (motion) => {
@@ -121,6 +124,14 @@ function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly Fi
   const motions = pageAccess.allows("ingest") ? files.filter((file) => !isAvatarFile(file)) : [];
   if (avatar || motions.length > 0) page.panels.open("library");
   void uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
+}
+
+function captureTarget({ current }: PlaybackController): CaptureTarget {
+  return {
+    server: location.origin,
+    session: current?.kind === "sessions" ? current.id : null,
+    needsToken: pageAccess.hasToken,
+  };
 }
 
 function savePicture({ exporter, library }: AppParts): void {

@@ -55,6 +55,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "{count} here": "{count}人が観劇中",
   "{count} watching": "{count}人が観劇中",
   "{count} watching; at the strings: {names}": "{count}人が観劇中。糸を持つ人：{names}",
+  "Live {names}": "生出演 {names}",
   you: "あなた",
   "{name} (you)": "{name}（あなた）",
   // transport
@@ -90,6 +91,23 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Drop a dance here": "ここに踊りをドロップ",
   "motion .bvh, up to 64 MB, or press to choose": "BVHファイル、64 MBまで。押して選択",
   "Drop a dance, or an avatar to dance as": "踊りか、踊らせるアバターをドロップ",
+  // live performers
+  "Perform live": "生で踊る",
+  "Your own movement, from a motion capture tool, on this stage.":
+    "モーションキャプチャーのツールから、自分の動きをこの舞台に送れます。",
+  "Become a performer": "踊り手になる",
+  "Ask whoever runs this server for a token that allows performing: {command}":
+    "サーバーの管理者に、踊るためのトークンを発行してもらいます：{command}",
+  "This server asks for no token. Go to the computer on which your capture tool runs.":
+    "このサーバーにトークンは要りません。キャプチャーのツールが動くコンピューターを使います。",
+  "Install Bunraku there and start: {command}":
+    "そのコンピューターにBunrakuを入れて、次のコマンドを実行します：{command}",
+  "Let your tool send VMC to port {port} of that computer. You are on the stage as soon as it sends; Ctrl-C ends it.":
+    "ツールのVMCの送信先を、そのコンピューターのポート{port}にします。送信が始まると舞台に出て、Ctrl-Cで終わります。",
+  Copy: "コピー",
+  Copied: "コピーしました",
+  "The steps could not be loaded. Check your connection, then try again":
+    "手順を読み込めませんでした。接続を確かめて、もう一度試してください",
   // avatar
   "Dance as": "踊り手",
   "The puppet": "人形",
@@ -239,6 +257,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   Buffer: "バッファ",
   "Clock error": "時計の誤差",
   Latency: "遅延",
+  "Live: {time} after the movement": "生出演：動きから{time}後に表示",
   "No dance yet": "演目なし",
   "Level {level} of {levels}": "レベル{level} / {levels}",
   ", {reason}": "：{reason}",

@@ -1,9 +1,11 @@
-/** Page header: wordmark, motion name, viewers, and the buttons for sharing, keys, language and theme. */
+/**
+ * Page header: wordmark, motion name, live performers, viewers, and the buttons for sharing, keys, language and theme.
+ */
 import { isolateBidi } from "../i18n/bidi";
 import { formatDecimal } from "../i18n/number-format";
-import { joinList, pageLanguage, translate } from "../i18n/translator";
+import { joinList, pageLanguage, translate, translateToParts } from "../i18n/translator";
 import type { Theme } from "../stage/scenery/look";
-import { element, setText } from "./dom";
+import { element, setAttribute, setText } from "./dom";
 import { initialOf } from "./format";
 import { icon } from "./icon";
 import type { Presence } from "./limb-state";
@@ -16,6 +18,7 @@ const OTHER_LANGUAGE = {
 
 export interface Header {
   setMotionName(name: string): void;
+  /** Show who watches, who holds the strings (`self` is this page's id), and who performs live. */
   renderPeople(presence: Presence | null, self: string | null): void;
   setTheme(theme: Theme): void;
   /** Elements of the header that cover the picture. */
@@ -40,6 +43,19 @@ export function createHeader(
       motionName,
     ),
   );
+  const liveNames = element("span", { dir: "auto" });
+  const liveBadge = element(
+    "span",
+    { class: "live", hidden: true },
+    ...translateToParts("Live {names}", { names: liveNames }),
+  );
+  // present from the start, so that screen readers announce its changes
+  const live = element("div", { class: "live-status", role: "status" }, liveBadge);
+  const renderLive = (names: readonly string[]) => {
+    liveBadge.hidden = names.length === 0;
+    setText(liveNames, joinList(names.map(isolateBidi)));
+    setAttribute(liveBadge, "title", names.length > 0 ? liveNames.textContent : null);
+  };
   const count = element("span", { class: "people-count" });
   const avatars = element("span", { class: "avatars" });
   const people = element("div", { class: "people", role: "group", hidden: true }, count, avatars);
@@ -74,14 +90,16 @@ export function createHeader(
   );
   const theme = element("button", { class: "round-button", type: "button", onClick: actions.theme }, icon("theme"));
   const right = element("div", { class: "header-right" }, people, share, keys, language, theme);
-  root.append(element("header", { class: "header" }, brand, right));
+  const left = element("div", { class: "header-left" }, brand, live);
+  root.append(element("header", { class: "header" }, left, right));
   return {
-    parts: [brand, right],
+    parts: [brand, liveBadge, right],
     setMotionName(name) {
       setText(motionName, name);
       document.title = name ? `${isolateBidi(name)} - Bunraku` : "Bunraku";
     },
     renderPeople(presence, self) {
+      renderLive(presence?.live?.map(({ name }) => name) ?? []);
       people.hidden = !presence || (presence.viewers < 1 && presence.puppeteers.length === 0);
       if (!presence) return;
       const viewers = Math.max(presence.viewers, presence.puppeteers.length);

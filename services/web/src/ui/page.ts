@@ -6,6 +6,7 @@ import type { AvatarActions } from "./library/avatar-chooser";
 import type { RequestDownload } from "./library/download-menu";
 import { acceptDrops, createLibraryPanel, type LibraryPanel } from "./library/library-panel";
 import type { MotionItem } from "./library/motion-item";
+import type { PerformerActions } from "./library/performer-section";
 import { createLinkPanel, type LinkPanel } from "./link/link-panel";
 import { createLazyMappingDialog } from "./mapping/lazy-mapping-dialog";
 import type { MappingDialog } from "./mapping/mapping-dialog";
@@ -21,7 +22,11 @@ import { createStringsPanel, type StringsActions, type StringsPanel } from "./st
 import type { SoundActions } from "./transport/sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport/transport";
 
-export interface UserActions extends StringsActions, SoundActions, AvatarActions {
+export interface UserActions
+  extends StringsActions,
+    SoundActions,
+    AvatarActions,
+    Omit<PerformerActions, "guideFailed"> {
   share(): void;
   /** Switch to the other language. */
   language(): void;
@@ -81,7 +86,11 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
   const messageArea = createMessageArea(root, noticeElement, () => occupied.invalidate());
   const limbRequests = createLimbRequests(messageArea.element, actions.give);
   const toast = createToast(messageArea.element);
-  const library = createLibraryPanel(root, { ...actions, close: () => panels.close("library") });
+  const library = createLibraryPanel(root, {
+    ...actions,
+    close: () => panels.close("library"),
+    guideFailed: () => toast(translate("The steps could not be loaded. Check your connection, then try again")),
+  });
   const strings = createStringsPanel(root, {
     ...actions,
     close: () => panels.close("strings"),

@@ -12,6 +12,8 @@ const DATA_HEADER_BYTES = 2;
 const MAX_INDEX_BYTES = 3;
 const FIXED_MESSAGE_BYTES = 32;
 const SAMPLE_BYTES = 136;
+/** Bound of each coordinate of a sample's root. */
+const MAX_ROOT_M = 100;
 const SAMPLE_ROOT_AT = 16;
 const SAMPLE_ROTATIONS_AT = 28;
 
@@ -128,7 +130,7 @@ export function packSample(message: Sample): Uint8Array<ArrayBuffer> {
   return bytes;
 }
 
-/** @throws MalformedMessage, also for a position that is not finite */
+/** @throws MalformedMessage, also for a position beyond `MAX_ROOT_M` */
 export function unpackSample(bytes: Uint8Array): Sample {
   if (bytes.length !== SAMPLE_BYTES)
     throw new MalformedMessage(`Sample has ${bytes.length} bytes, expected ${SAMPLE_BYTES} bytes`);
@@ -138,7 +140,9 @@ export function unpackSample(bytes: Uint8Array): Sample {
     view.getFloat32(SAMPLE_ROOT_AT + 4, true),
     view.getFloat32(SAMPLE_ROOT_AT + 8, true),
   ];
-  if (!root.every(Number.isFinite)) throw new MalformedMessage("Sample has a root position that is not finite");
+  // numbers that are not finite are not within the bound either
+  if (!root.every((coordinate) => Math.abs(coordinate) <= MAX_ROOT_M))
+    throw new MalformedMessage(`Sample has a root position that is not within ${MAX_ROOT_M} m`);
   return {
     name: "Sample",
     sequence: view.getUint32(4, true),

@@ -1,4 +1,7 @@
-/** Library panel: drop zone, progress of uploads and downloads, errors, list of motions, and avatar section. */
+/**
+ * Library panel: drop zone, progress of uploads and downloads, errors, list of motions, avatar section, and the guide
+ * for live performers.
+ */
 import type { UploadProgress } from "../../client/api";
 import { formatPercent } from "../../i18n/number-format";
 import { joinList, translate, translateToParts } from "../../i18n/translator";
@@ -9,6 +12,7 @@ import { createPanel, type Panel } from "../panel";
 import { type AvatarActions, type AvatarChooser, createAvatarChooser } from "./avatar-chooser";
 import { createDownloadMenu, type DownloadMenu, type RequestDownload } from "./download-menu";
 import type { MotionItem } from "./motion-item";
+import { createPerformerSection, type PerformerActions } from "./performer-section";
 
 export interface UploadRow {
   /** Show the bytes sent, of `total`, after `seconds` seconds. */
@@ -36,7 +40,7 @@ export interface LibraryPanel {
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
-export interface LibraryActions extends AvatarActions {
+export interface LibraryActions extends AvatarActions, PerformerActions {
   files(files: readonly File[]): void;
   choose(id: string): void;
   remove(motion: MotionItem): void;
@@ -74,7 +78,7 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
   let openMenu: string | null = null;
   const menus = new Map<string, DownloadMenu>();
   const danceAs = createAvatarChooser(actions);
-  panel.body.append(drop, picker, transfers, alert, list, empty, danceAs.element);
+  panel.body.append(drop, picker, transfers, alert, list, empty, danceAs.element, ...createPerformerSection(actions));
   return {
     panel,
     danceAs,

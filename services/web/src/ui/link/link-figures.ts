@@ -1,6 +1,6 @@
 /**
- * Content of the connection panel: bitrate, buffer, clock error and latency over the last minute, and the reason for the
- * bitrate.
+ * Content of the connection panel: bitrate, buffer, clock error and latency over the last minute, the reason for the
+ * bitrate, and the latency of live performers.
  */
 import { formatDecimal } from "../../i18n/number-format";
 import { translate } from "../../i18n/translator";
@@ -30,15 +30,18 @@ export function createLinkFigures(root: HTMLElement, histories: LinkHistories, s
     clock: createPlot({ label: translate("Clock error"), color: "var(--holder-3)", minTop: 2 }),
     latency: createPlot({ label: translate("Latency"), color: "var(--holder-2)", minTop: 50 }),
   };
+  const live = element("p", { class: "why", hidden: true });
   root.append(
     element("p", { class: "why" }, level, reason),
+    live,
     element("div", { class: "plots" }, ...Object.values(plots).map((plot) => plot.element)),
   );
   const milliseconds = (value: number | null) =>
     value === null ? "-" : `${formatDecimal(value, Math.abs(value) < 10 ? 1 : 0)} ms`;
   return {
     render(statistics, levelCount) {
-      const { kbps, bufferSeconds, clockErrorMs, clockOffsetMs, latencyMs, firstPoseMs, gaps } = statistics;
+      const { kbps, bufferSeconds, clockErrorMs, clockOffsetMs, latencyMs, firstPoseMs, gaps, liveLatencyMs } =
+        statistics;
       setText(
         level,
         statistics.rate < 0
@@ -46,6 +49,8 @@ export function createLinkFigures(root: HTMLElement, histories: LinkHistories, s
           : translate("Level {level} of {levels}", { level: statistics.rate + 1, levels: levelCount }),
       );
       setText(reason, statistics.reason ? translate(", {reason}", { reason: statistics.reason }) : "");
+      live.hidden = liveLatencyMs === null;
+      setText(live, translate("Live: {time} after the movement", { time: milliseconds(liveLatencyMs) }));
       plots.bitrate.render(
         histories.bitrate,
         slots,
