@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import struct
 from urllib.parse import urlsplit
 
 from websockets.client import ClientProtocol
 from websockets.typing import Subprotocol
 from websockets.uri import parse_uri
 
-from bunraku.websocket.frame import Opcode
+from bunraku.websocket.frame import MAX_CONTROL_BYTES, Opcode
 from bunraku.wire.messages import SUBPROTOCOL
 
 
@@ -30,5 +31,7 @@ async def open_raw(url: str) -> tuple[asyncio.StreamReader, asyncio.StreamWriter
 
 
 def client_frame(opcode: Opcode, payload: bytes = b"", *, final: bool = True) -> bytes:
-    """Return a frame of a client with at most 125 bytes of payload, masked with zeros."""
-    return bytes(((0x80 if final else 0) | opcode, 0x80 | len(payload))) + bytes(4) + payload
+    """Return a frame of a client with less than 64 kB of payload, masked with zeros."""
+    size = len(payload)
+    length = bytes([0x80 | size]) if size <= MAX_CONTROL_BYTES else struct.pack(">BH", 0x80 | 126, size)
+    return bytes([(0x80 if final else 0) | opcode]) + length + bytes(4) + payload

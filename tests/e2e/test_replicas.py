@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import json
+import math
 import sys
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import AsyncExitStack, ExitStack, asynccontextmanager
 from pathlib import Path
@@ -13,6 +16,7 @@ import pytest
 from websockets.asyncio.client import connect
 
 from bunraku.client import Client, ControlRefused, Puppeteer, ServerProblem
+from bunraku.wire.live import Live
 from bunraku.wire.messages import SUBPROTOCOL, Presence, TimelineState, unpack
 from bunraku.wire.overlay import Overlay
 from tests.processes import ServerProcess, free_port, nats_url_of, run_jetstream
@@ -191,3 +195,39 @@ async def test_session_is_controlled_through_any_replica_and_outlives_its_owner(
         await asyncio.to_thread(deployment.nats.start)
         await retry_until_available(lambda: three.edit_session(session, playing=False))
         await asyncio.gather(*waiting)
+
+
+async def test_live_performer_goes_on_when_the_owner_of_its_session_is_killed(deployment: Deployment) -> None:
+    urls = {name: deployment.url(name) for name in deployment.processes}
+
+    async def is_shown(viewer: RecordingViewer, performer: int) -> None:
+        await viewer.wait_for(lambda message: isinstance(message, Live) and performer in message.blocks)
+
+    async with AsyncExitStack() as stack:
+        first, second, ingest = [
+            await stack.enter_async_context(Client(urls[name])) for name in ("session 1", "session 2", "ingest")
+        ]
+        # the stage is at the first replica; the performer is connected to the second
+        performer = await first.create_performer({"name": "Aiko"})
+        session = performer["session"]
+        address = second.socket_url(performer["input"])
+        socket = await stack.enter_async_context(connect(address, subprotocols=[SUBPROTOCOL], compression=None))  # type: ignore[list-item]
+
+        async def send_samples() -> None:
+            while True:
+                await socket.send(json.dumps({"root": [0.0, 0.8 + 0.1 * math.sin(time.monotonic()), 0.0]}))
+                await asyncio.sleep(1 / 60)
+
+        sending = asyncio.create_task(send_samples())
+        stack.callback(sending.cancel)
+        viewer = await stack.enter_async_context(watch_session(urls["stream 1"], session))
+        await is_shown(viewer, 0)
+        deployment.processes["session 1"].kill()
+        await viewer.wait_for(lambda message: isinstance(message, Presence) and bool(message.live))
+        await is_shown(viewer, 0)
+        assert (await second.performer(performer["id"]))["name"] == "Aiko"
+        sending.cancel()
+        await second.end_performer(performer["id"])
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while performer["motion"] not in [motion["id"] for motion in await ingest.motions()]:  # noqa: ASYNC110
+                await asyncio.sleep(0.1)

@@ -163,8 +163,8 @@ def pack_sample(sampled: int, pose: Pose, sequence: int = 0) -> Sample:
     """
     root, rotations = pose
     units = np.round(rotation.to_rotation_vector(rotations) / RADIANS_PER_UNIT).astype(int)
-    x, y, z = root
-    return Sample(sequence, sampled, (float(x), float(y), float(z)), tuple(units.ravel().tolist()))
+    x, y, z = np.asarray(root, dtype=np.float32).tolist()
+    return Sample(sequence, sampled, (x, y, z), tuple(units.ravel().tolist()))
 
 
 def sample_pose(sample: Sample) -> Pose:
