@@ -139,7 +139,7 @@ def _shows(skeletons: list[SkeletonDescription], random: np.random.Generator) ->
     poses = []
     for frame in SHOWN_FRAMES:
         clock = NOW_US + round(frame * FRAME_US)
-        performers = []
+        performers: list[dict[str, Any] | None] = []
         for buffer, placement in zip(buffers, placements, strict=True):
             pose = buffer.pose_at(clock)
             if pose is None:

@@ -6,7 +6,7 @@ import { HostileInputCounts } from "../hostile-input";
 
 const block = fc.record({
   ageUs: fc.nat(255).map((units) => units * 4_000),
-  data: fc.oneof(fc.uint8Array({ maxLength: 150 }), fc.uint8Array({ minLength: 16_383, maxLength: 16_383 })),
+  data: fc.uint8Array({ maxLength: 300, size: "max" }),
 });
 const lives: fc.Arbitrary<Live> = fc.record({
   name: fc.constant("Live" as const),
@@ -26,6 +26,13 @@ test("a message reads back unchanged, in 10 bytes and 2 or 3 and the block of ea
       expect(unpackLive(bytes)).toEqual(live);
     }),
   );
+});
+
+test("a block may have 16,383 bytes", () => {
+  const data = new Uint8Array(16_383).fill(7);
+  const bytes = packLive({ name: "Live", due: 1, frames: 1, blocks: new Map([[0, { ageUs: 0, data }]]) });
+  expect([...bytes.subarray(11, 13)]).toEqual([255, 127]);
+  expect(unpackLive(bytes).blocks.get(0)!.data).toHaveLength(16_383);
 });
 
 test("an age is rounded to its unit and limited", () => {
