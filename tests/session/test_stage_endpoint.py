@@ -40,6 +40,9 @@ class FakeStageOwner:
         self.ended: list[str] = []
         self.casts: CastStore
 
+    def require_room(self, subject: str) -> None:
+        assert subject is not None
+
     async def load_cast(self, cast: Cast) -> StoredMotion:
         raise ProblemError(404, "No such motion", cast.motion)
 

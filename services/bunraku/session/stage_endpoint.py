@@ -55,6 +55,9 @@ class StageOwner(Protocol):
     casts: CastStore
     """Motions of the casts of all stages."""
 
+    def require_room(self, subject: str) -> None:
+        """Raise `ProblemError` unless the replica can show another live performer of a subject."""
+
     async def load_cast(self, cast: Cast) -> StoredMotion:
         """Return the motion of a cast; raises `ProblemError`."""
 
@@ -82,7 +85,7 @@ class StageEndpoint:
         self._subject = f"session.{stage.id}"
         self._inputs: dict[str, PuppeteerInput] = {}
         self._join_rate = KeyedTokenBuckets(JOINS_PER_S, JOIN_BURST)
-        self._performers = PerformerEndpoint(stage, context, self, owner.casts)
+        self._performers = PerformerEndpoint(stage, context, self, owner)
         bus = context.bus
         operations: dict[str, Callable[[Any], Awaitable[Any]]] = {
             "describe": self._answer_describe,
