@@ -331,7 +331,8 @@ async def measure_output(bench: Bench, server: Server) -> Figures:
     async with (
         run_capture_process(server.url, source) as capture,
         Client(server.url) as client,
-        receive_datagrams() as receiver,Puppeteer(client, capture.session, "bench") as puppeteer
+        receive_datagrams() as receiver,
+        Puppeteer(client, capture.session, "bench") as puppeteer,
     ):
         await puppeteer.claim("left_hand")
         await puppeteer.target("left_hand", 0.4, 0.3, 0.5)
