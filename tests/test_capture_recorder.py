@@ -6,58 +6,21 @@ import asyncio
 import json
 import re
 import signal
-import socket
-import sys
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bunraku import capture_recorder
+from bunraku.capture.session import TimedPose
 from bunraku.capture.vmc import VmcAssembler
-from bunraku.capture_recorder import CaptureReceiver, explain_empty_take
+from bunraku.capture_recorder import CaptureReceiver, describe_capture, explain_empty_take
 from bunraku.motion.analysis import analyse
 from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.skeleton import joint_and_tip_positions
-from tests.capture.samples import sample_performance
-from tests.capture.vmc_performer import make_bundle, make_messages
+from tests.capture.capture_process import FPS, make_packet, run_capture, send_packets
 from tests.processes import free_port
-from tests.time_limit import HANG_TIMEOUT_S
-
-BUNRAKU = Path(sys.executable).parent / "bunraku"
-FPS = 30.0
-
-
-def packet(number: int) -> bytes:
-    performance = sample_performance()
-    return make_bundle(make_messages(performance, number % performance.frame_count, number / FPS))
-
-
-@asynccontextmanager
-async def run_capture(*arguments: str) -> AsyncIterator[asyncio.subprocess.Process]:
-    """Run `bunraku capture`, from the moment at which it listens, and end it."""
-    process = await asyncio.create_subprocess_exec(
-        BUNRAKU, "capture", *arguments, stdout=asyncio.subprocess.PIPE, stderr=asyncio.subprocess.PIPE
-    )
-    try:
-        assert process.stderr is not None
-        async with asyncio.timeout(HANG_TIMEOUT_S):
-            assert b"Listening for VMC" in await process.stderr.readline()
-            yield process
-    finally:
-        if process.returncode is None:
-            process.kill()
-        await process.communicate()
-
-
-async def send_packets(port: int, count: int) -> None:
-    """Send the packets of a performer in real time: times of frames come from their arrivals, too."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-        for number in range(count):
-            sender.sendto(packet(number), ("127.0.0.1", port))
-            await asyncio.sleep(1 / FPS)
 
 
 @pytest.mark.parametrize("stop", [signal.SIGINT, signal.SIGTERM], ids=["ctrl-c", "stopped"])
@@ -109,7 +72,7 @@ def test_take_without_a_packet_says_so_and_saves_nothing(tmp_path: Path) -> None
 
 @pytest.mark.parametrize(
     ("packets", "message"),
-    [([b"hello"], "No packet could be read as VMC"), ([packet(0), packet(1)], "The take is too short")],
+    [([b"hello"], "No packet could be read as VMC"), ([make_packet(0), make_packet(1)], "The take is too short")],
     ids=["invalid", "short"],
 )
 def test_take_without_a_pose_is_explained(packets: list[bytes], message: str) -> None:
@@ -125,9 +88,48 @@ def test_invalid_packets_change_nothing_and_a_take_has_a_maximum(monkeypatch: py
     receiver = CaptureReceiver(VmcAssembler(), lambda: now)
     for number in range(60):
         now = 10.0 + number / FPS
-        receiver.datagram_received(packet(number), ("127.0.0.1", 1))
+        receiver.datagram_received(make_packet(number), ("127.0.0.1", 1))
         receiver.datagram_received(b"\x00\xff" * 40, ("127.0.0.1", 1))
         receiver.poll()
     assert receiver.is_full
     assert (len(receiver.poses), receiver.invalid, receiver.datagrams) == (20, 60, 120)
     assert receiver.problem is not None
+
+
+def test_figure_of_the_first_calibration_stays_and_poses_are_passed_on() -> None:
+    now, passed = 0.0, 0
+
+    def on_poses(poses: Sequence[TimedPose]) -> None:
+        nonlocal passed
+        passed += len(poses)
+
+    receiver = CaptureReceiver(VmcAssembler(), lambda: now, keeps_poses=False, on_poses=on_poses)
+
+    def send(numbers: range) -> None:
+        nonlocal now
+        for number in numbers:
+            now = 10.0 + number / FPS
+            receiver.datagram_received(make_packet(number), ("127.0.0.1", 1))
+
+    send(range(60))
+    figure, calibration = receiver.figure, receiver.session.calibration
+    receiver.recalibrate()
+    assert "calibrating again" in describe_capture(receiver, None, FPS)
+    send(range(60, 120))
+    assert receiver.session.calibration is not calibration
+    assert receiver.figure is figure
+    assert (receiver.poses, passed) == ([], receiver.pose_count)
+    assert passed == 90
+
+
+async def test_recording_can_be_calibrated_again_by_a_key(tmp_path: Path) -> None:
+    port = free_port()
+    async with run_capture("vmc", str(tmp_path / "take.bvh"), "--port", str(port), "--json") as process:
+        assert process.stdin is not None
+        process.stdin.write(b"c\nx\n")
+        await process.stdin.drain()
+        await send_packets(port, 60)
+        process.send_signal(signal.SIGTERM)
+        output, errors = await process.communicate()
+    assert process.returncode == 0, errors
+    assert json.loads(output)["frames"] > 10

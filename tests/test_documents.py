@@ -65,6 +65,28 @@ def test_sdk_python_example_records_a_motion(server: str, folder: Path) -> None:
     assert re.search(r"recorded \w+", output)
 
 
+def test_live_python_example_performs_a_motion(server: str, folder: Path) -> None:
+    output = run_python(code_block(ROOT / "docs" / "live.md", "python", "client.perform"), server, folder)
+    assert re.search(r"\?session=\w+\nmotion \w+", output)
+
+
+def has_recent_node() -> bool:
+    """Return whether Node has a WebSocket client."""
+    node = shutil.which("node")
+    code = "process.exit(globalThis.WebSocket ? 0 : 1)"
+    return node is not None and subprocess.run([node, "-e", code], check=False).returncode == 0
+
+
+@pytest.mark.skipif(not has_recent_node(), reason="Node 22 is not installed")
+def test_live_json_example_performs_a_motion(server: str, folder: Path) -> None:
+    script = folder / "performer.mjs"
+    code = code_block(ROOT / "docs" / "live.md", "js", "performer.input")
+    script.write_text(code.replace("http://127.0.0.1:8000", server))
+    ran = subprocess.run(["node", script], capture_output=True, text=True, timeout=HANG_TIMEOUT_S, check=False)
+    assert ran.returncode == 0, ran.stderr
+    assert re.search(r"motion \w+", ran.stdout)
+
+
 @pytest.mark.skipif(shutil.which("curl") is None, reason="curl is not installed")
 def test_readme_curl_examples_answer(server: str, folder: Path) -> None:
     script = "set -e\n" + code_block(README, "sh", "curl").replace("http://127.0.0.1:8000", server)

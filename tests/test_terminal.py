@@ -1,6 +1,11 @@
 from __future__ import annotations
 
+import asyncio
 import json
+import os
+import signal
+import subprocess
+import sys
 
 import pytest
 import typer
@@ -8,6 +13,7 @@ from rich.table import Table
 
 from bunraku import terminal
 from bunraku.client.server_problem import ServerProblem
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 def test_print_plain_ignores_markup_and_width(capsys: pytest.CaptureFixture[str]) -> None:
@@ -58,3 +64,41 @@ def test_failed_request_prints_the_error_escaped(capsys: pytest.CaptureFixture[s
     with pytest.raises(typer.Exit):
         terminal.run_request(fail, "http://127.0.0.1:1")
     assert "\x1b" not in capsys.readouterr().err
+
+
+def run_until_signalled(*sent: signal.Signals) -> int:
+    """Run a process that never ends after it is stopped, send it signals one after the other, and return its status."""
+    code = (
+        "import asyncio\n"
+        "from bunraku.terminal import call_when_stopped\n"
+        "async def main():\n"
+        "    call_when_stopped(lambda: print('stopped', flush=True))\n"
+        "    print('ready', flush=True)\n"
+        "    await asyncio.Event().wait()\n"
+        "asyncio.run(main())\n"
+    )
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        assert process.stdout is not None
+        for number, expected in zip(sent, (b"ready\n", b"stopped\n"), strict=False):
+            assert process.stdout.readline() == expected
+            process.send_signal(number)
+        return process.wait(HANG_TIMEOUT_S)
+    finally:
+        process.kill()
+        process.communicate()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_second_signal_ends_a_process_that_was_asked_to_stop(number: signal.Signals) -> None:
+    assert run_until_signalled(number, number) == -number
+
+
+async def test_lines_of_the_input_are_passed_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    parts = [b"c\n a", b" b \nunfinished", b""]
+    monkeypatch.setattr(os, "isatty", lambda _: False)
+    monkeypatch.setattr(os, "read", lambda *_: parts.pop(0))
+    lines: asyncio.Queue[str] = asyncio.Queue()
+    terminal.call_at_input(lines.put_nowait)
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        assert [await lines.get(), await lines.get()] == ["c", "a b"]

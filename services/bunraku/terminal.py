@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import os
 import re
 import signal
 import sys
+import threading
 from collections.abc import Awaitable, Callable
 from json import dumps
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
@@ -121,11 +124,41 @@ async def resolve_stream_url(client: Client, address: str) -> str:
 def call_when_stopped(stop: Callable[[], object]) -> None:
     """Call `stop` in the running event loop at Ctrl-C, and if another process stops this one (SIGTERM).
 
-    On Windows, whose event loops handle no signals, Ctrl-C stays a KeyboardInterrupt.
+    The next signal ends the process at once. On Windows, whose event loops handle no signals, Ctrl-C stays a
+    KeyboardInterrupt.
     """
-    if sys.platform != "win32":
-        for number in (signal.SIGINT, signal.SIGTERM):
-            asyncio.get_running_loop().add_signal_handler(number, stop)
+    if sys.platform == "win32":
+        return
+    loop, numbers = asyncio.get_running_loop(), (signal.SIGINT, signal.SIGTERM)
+
+    def on_signal() -> None:
+        for number in numbers:
+            loop.remove_signal_handler(number)
+        stop()
+
+    for number in numbers:
+        loop.add_signal_handler(number, on_signal)
+
+
+def call_at_input(handle: Callable[[str], object]) -> None:
+    """Call `handle` in the running event loop with each line of standard input, until the input or the loop ends.
+
+    A command in the background of a terminal reads nothing, as the system would stop it.
+    """
+    if sys.platform != "win32" and os.isatty(0) and os.tcgetpgrp(0) != os.getpgrp():
+        return
+    loop = asyncio.get_running_loop()
+
+    def read() -> None:
+        unfinished = b""
+        # not `sys.stdin`, whose lock would be held when Python ends
+        with contextlib.suppress(OSError, RuntimeError):
+            while data := os.read(0, 1024):
+                *lines, unfinished = (unfinished + data)[-1024:].split(b"\n")
+                for line in lines:
+                    loop.call_soon_threadsafe(handle, line.decode(errors="replace").strip())
+
+    threading.Thread(target=read, name="standard input", daemon=True).start()
 
 
 def run_request(request: Callable[[], Awaitable[Result]], server: str) -> Result:

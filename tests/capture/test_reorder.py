@@ -90,3 +90,10 @@ def test_hostile_times_keep_the_buffer_bounded() -> None:
             assert timed.time_s > last_s
             last_s = timed.time_s
         assert len(buffer._waiting) <= 65
+
+
+def test_missing_frames_are_counted_and_pauses_are_not() -> None:
+    numbers = [number for number in range(120) if number not in (30, 50, 51, 52) and not 70 <= number < 110]
+    released, buffer = run([Arrival(number, number / 60, number / 60 + 0.002) for number in numbers])
+    assert len(released) == len(numbers)
+    assert buffer.statistics.missing == 4

@@ -24,6 +24,8 @@ WAIT_DECAY_S = 10.0
 GAP_FACTOR = 1.5
 """Interval, as a multiple of the usual one, from which a frame counts as missing."""
 PERIOD_GAIN = 0.1
+MAX_GAP_S = 0.5
+"""Longest interval in which frames count as missing: after it the sender has paused."""
 MAX_WAITING_FRAMES = 64
 RECENT_FRAMES = 256
 """Frames remembered to recognise duplicates."""
@@ -41,11 +43,15 @@ class TimedFrame:
 
 @dataclass(slots=True)
 class ReorderStatistics:
-    """Frames released, and frames dropped because they were duplicates or too late."""
+    """Frames released, frames dropped because they were duplicates or too late, and frames that never arrived.
+
+    `missing` is an estimate from the usual interval.
+    """
 
     released: int = 0
     duplicates: int = 0
     late: int = 0
+    missing: int = 0
 
 
 class ReorderBuffer:
@@ -137,5 +143,7 @@ class ReorderBuffer:
         elif interval_s <= GAP_FACTOR * self._period_s:
             self._period_s += PERIOD_GAIN * (interval_s - self._period_s)
         else:
+            if interval_s <= MAX_GAP_S:
+                self.statistics.missing += round(interval_s / self._period_s) - 1
             # gaps count little, so that loss does not stretch the period, but a slower sender is followed
             self._period_s *= 1.0 + 0.1 * PERIOD_GAIN

@@ -37,6 +37,11 @@ class CaptureSession:
         self._calibration_start_s: float | None = None
 
     @property
+    def is_calibrating(self) -> bool:
+        """True while frames are collected for a calibration."""
+        return self._collected is not None
+
+    @property
     def statistics(self) -> ReorderStatistics:
         """Counts of frames released and dropped."""
         return self._buffer.statistics

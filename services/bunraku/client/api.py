@@ -44,6 +44,10 @@ class Client:
     async def __aexit__(self, *_: object) -> None:
         await self._http.aclose()
 
+    async def health(self) -> dict[str, Any]:
+        """Return status and version of the server."""
+        return await self._request("GET", "/v1/health")
+
     async def upload(
         self,
         path: Path,

@@ -51,6 +51,9 @@ class LoadStatistics:
     overlay_late_ms_p95: float | None
     overlay_late_ms_p99: float | None
     overlay_gap_ms_p99: float | None
+    live_messages: int
+    live_late_ms_p99: float | None
+    live_gap_ms_p99: float | None
     blocks: int
     block_late_ms_p50: float | None
     block_late_ms_p95: float | None
@@ -109,7 +112,9 @@ class LoadGenerator:
     def reset_statistics(self) -> None:
         """Start counting anew."""
         self._measured_from, self._initial_bytes = time.monotonic(), self.state.received_bytes
-        for samples in (self.state.overlay_lateness, self.state.overlay_gaps, self.state.block_lateness):
+        shared = self.state
+        lateness = (shared.overlay_lateness, shared.live_lateness, shared.block_lateness)
+        for samples in (*lateness, shared.overlay_gaps, shared.live_gaps):
             del samples[:]
         self.state.stalls = 0
 
@@ -139,6 +144,9 @@ class LoadGenerator:
             overlay_late_ms_p95=overlays[1],
             overlay_late_ms_p99=overlays[2],
             overlay_gap_ms_p99=_percentiles(shared.overlay_gaps, 1e-3)[2],
+            live_messages=len(shared.live_lateness),
+            live_late_ms_p99=_percentiles(shared.live_lateness, 1e-3)[2],
+            live_gap_ms_p99=_percentiles(shared.live_gaps, 1e-3)[2],
             blocks=len(shared.block_lateness),
             block_late_ms_p50=blocks[0],
             block_late_ms_p95=blocks[1],

@@ -12,6 +12,7 @@ from bunraku.codec.timing import Timing, parse_timing
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.timeline import TimelineHistory, position_at
 from bunraku.wire.errors import MalformedMessage
+from bunraku.wire.live import Live
 from bunraku.wire.messages import ChannelHeader, Data, Description, Ping, Pong, Problem, Report, TimelineState, unpack
 from bunraku.wire.overlay import Overlay
 
@@ -24,7 +25,8 @@ CLOCK_CACHE_S = 0.2
 class LoadState:
     """State shared by all viewers of a load test: clock, timeline, and counts.
 
-    Lateness of overlays and blocks, and gaps between overlays of a controlled limb at one viewer, in microseconds.
+    Lateness of overlays, live poses and blocks, and gaps between overlays of a controlled limb, or between live poses,
+    at one viewer, in microseconds.
     """
 
     def __init__(self) -> None:
@@ -33,6 +35,8 @@ class LoadState:
         self.timing: Timing | None = None
         self.overlay_lateness = array("i")
         self.overlay_gaps = array("i")
+        self.live_lateness = array("i")
+        self.live_gaps = array("i")
         self.block_lateness = array("i")
         self.stalls = 0
         self.received_bytes = 0
@@ -89,6 +93,7 @@ class LoadViewer(MessageSocket):
         "_block_count",
         "_buffered_until",
         "_is_controlled",
+        "_last_live_at",
         "_last_overlay_at",
         "_received_at",
         "_received_blocks",
@@ -103,6 +108,7 @@ class LoadViewer(MessageSocket):
         self._received_blocks: set[int] = set()
         self._block_count = 0
         self._buffered_until = 0
+        self._last_live_at = 0
         self._last_overlay_at = 0
         self._is_controlled = False
 
@@ -123,6 +129,12 @@ class LoadViewer(MessageSocket):
             if self._is_controlled:
                 shared.overlay_gaps.append(_clamp_int32(now - self._last_overlay_at))
             self._last_overlay_at, self._is_controlled = now, bool(message[1] & 15)
+        elif kind == Live.TYPE:
+            shared.live_lateness.append(_clamp_int32(now - int.from_bytes(message[2:10], "little")))
+            if self._last_live_at:
+                shared.live_gaps.append(_clamp_int32(now - self._last_live_at))
+            # a mask of 0 is the last message for a while
+            self._last_live_at = now if message[1] & 15 else 0
         elif kind == Data.TYPE:
             self._count_block(message, now)
         elif kind == Pong.TYPE:

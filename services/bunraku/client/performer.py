@@ -8,6 +8,8 @@ import time
 from collections.abc import Mapping
 from typing import Any, Protocol, Self
 
+import httpx2
+
 from bunraku.client.authorization import authorization
 from bunraku.client.reconnecting_connection import ReconnectingConnection, StreamEnded
 from bunraku.client.server_problem import ServerProblem
@@ -23,6 +25,8 @@ INITIAL_PING_INTERVAL_S = 0.1
 """Interval of the first pings, which synchronise the clock."""
 INITIAL_PINGS = 5
 CONNECT_TIMEOUT_S = 10.0
+FLUSH_TIMEOUT_S = 3.0
+"""Time in which the last samples are received before the performance ends."""
 
 
 class PerformerServer(Protocol):
@@ -75,7 +79,9 @@ class Performer:
         """Samples sent."""
         self._connection: ReconnectingConnection | None = None
         self._tasks: list[asyncio.Task[None]] = []
+        self._pings = self._answered = 0
         self._is_connected = asyncio.Event()
+        self._has_answer = asyncio.Event()
 
     @property
     def session(self) -> str:
@@ -86,6 +92,11 @@ class Performer:
     def motion(self) -> str:
         """Id of the motion that is in the library when the performance has ended."""
         return str(self.description["motion"])
+
+    @property
+    def is_connected(self) -> bool:
+        """True while there is a connection to the server, which may be lost without notice."""
+        return self._connection is not None and self._connection.is_connected
 
     @property
     def reconnects(self) -> int:
@@ -118,12 +129,17 @@ class Performer:
         return self
 
     async def __aexit__(self, *_: object) -> None:
-        for task in self._tasks:
-            task.cancel()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        # ended already, by somebody else or by a timeout
-        with contextlib.suppress(ServerProblem):
-            await self._client.end_performer(self.description["id"])
+        try:
+            with contextlib.suppress(TimeoutError):
+                async with asyncio.timeout(FLUSH_TIMEOUT_S):
+                    await self._wait_until_received()
+            # ended already, by somebody else or by a timeout; a server that is unreachable ends it by itself
+            with contextlib.suppress(ServerProblem, httpx2.TransportError):
+                await self._client.end_performer(self.description["id"])
+        finally:
+            for task in self._tasks:
+                task.cancel()
+            await asyncio.gather(*self._tasks, return_exceptions=True)
 
     async def frame(self, pose: Pose, time_s: float | None = None) -> None:
         """Send a pose: root (3,) in metres and unit quaternions (18, 4), each in the frame of its parent.
@@ -141,10 +157,24 @@ class Performer:
         """Return the performer as the API shows it: its delay, and its samples by outcome."""
         return await self._client.performer(self.description["id"])
 
+    async def wait_until_ended(self) -> None:
+        """Wait until the performance was ended, by the server or by somebody else, and raise `StreamEnded`."""
+        await asyncio.wait(self._tasks[:1])
+        self._raise_ended()
+
     def _raise_ended(self) -> None:
         connection = self._tasks[0]
         if connection.done() and not connection.cancelled() and (error := connection.exception()) is not None:
             raise error if isinstance(error, StreamEnded) else StreamEnded(f"the connection failed: {error}")
+
+    async def _wait_until_received(self) -> None:
+        """Wait until the server has received all samples: it answers a Ping after them."""
+        if not self.is_connected or self._tasks[0].done():
+            return
+        sequence = await self._send_ping()
+        while self._answered < sequence:
+            self._has_answer.clear()
+            await self._has_answer.wait()
 
     def _on_bytes(self, data: bytes) -> None:
         try:
@@ -153,18 +183,25 @@ class Performer:
             return
         if isinstance(message, Pong):
             self.clock.add_sample(message.sent, message.received, message.answered, _monotonic_us())
+            self._answered = max(self._answered, message.sequence)
             self._is_connected.set()
+            self._has_answer.set()
         elif isinstance(message, Problem) and self._connection is not None:
             self._connection.close_reason = f"{message.title}: {message.detail}"
 
     async def _send_pings(self) -> None:
-        assert self._connection is not None
-        sequence = 0
         while True:
-            sequence += 1
-            await self._connection.send(Ping(sequence, _monotonic_us()).pack())
+            sequence = await self._send_ping()
             is_synchronised = sequence > INITIAL_PINGS and self.clock.is_synchronised
             await asyncio.sleep(PING_INTERVAL_S if is_synchronised else INITIAL_PING_INTERVAL_S)
+
+    async def _send_ping(self) -> int:
+        """Send a Ping and return its number."""
+        assert self._connection is not None
+        self._pings += 1
+        sequence = self._pings
+        await self._connection.send(Ping(sequence, _monotonic_us()).pack())
+        return sequence
 
 
 def _monotonic_us() -> int:

@@ -71,6 +71,11 @@ class ReconnectingConnection:
         self.close_reason = ""
         """Reason for the close that the server announced."""
 
+    @property
+    def is_connected(self) -> bool:
+        """True while there is a connection, which may be lost without notice."""
+        return self._connection is not None
+
     async def send(self, message: bytes) -> None:
         """Send a message if connected."""
         if self._connection is not None:
