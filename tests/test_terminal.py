@@ -7,7 +7,7 @@ import typer
 from rich.table import Table
 
 from bunraku import terminal
-from bunraku.client.api import ServerProblem
+from bunraku.client.server_problem import ServerProblem
 
 
 def test_print_plain_ignores_markup_and_width(capsys: pytest.CaptureFixture[str]) -> None:

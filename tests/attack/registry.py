@@ -138,6 +138,7 @@ def load_attacks() -> dict[str, Attack]:
         attack_frames,
         attack_http,
         attack_page,
+        attack_performer,
         attack_reader,
         attack_request,
         attack_request_flood,

@@ -23,9 +23,9 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast
-from bunraku.session.cast_store import CastStore
 from bunraku.session.counters import SessionCounters
+from bunraku.session.live.cast import Cast
+from bunraku.session.live.cast_store import CastStore
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRecord, SessionRegistry
 from bunraku.session.stage import SessionStart, Stage, load_bend_tables
 from bunraku.session.stage_endpoint import StageEndpoint, session_json
@@ -38,6 +38,8 @@ IDLE_TIMEOUT_US = 24 * 3_600 * 1_000_000
 """A session without viewers and puppeteers for this long is ended."""
 IDLE_GRACE_US = 10_000_000
 """A session without viewers and puppeteers for this long may be ended to make room at a full replica."""
+MAX_LIVE_PERFORMERS, MAX_LIVE_PERFORMERS_PER_SUBJECT = 16, 8
+"""Live performers of one replica, each of which takes 4 % of a processor, and those of one subject."""
 OPENINGS_PER_S, OPENING_BURST = 5.0, 50
 """Rate at which one subject may open sessions at a replica, and the number of openings at once."""
 MAX_CONCURRENT_CLAIMS = 8
@@ -95,6 +97,8 @@ class SessionManager:
         self._require_quota(subject, 1)
         self._limit_rate(subject)
         cast = motion if isinstance(motion, Cast) else Cast(motion)
+        for member in cast.members:
+            self.require_room(member.subject)
         stored = await self.load_cast(cast)
         await asyncio.to_thread(load_bend_tables, stored)
         self._require_quota(subject, 1)
@@ -226,6 +230,16 @@ class SessionManager:
             raise ProblemError(
                 429, "Too many sessions", "this link opens sessions too often", hint="try again in a second"
             )
+
+    def require_room(self, subject: str) -> None:
+        """Raise `ProblemError` unless this replica can show another live performer of `subject`."""
+        subjects = [member.subject for stage in self.stages for member in stage.cast.members]
+        if subject and subjects.count(subject) >= MAX_LIVE_PERFORMERS_PER_SUBJECT:
+            detail = f"{subject} has {MAX_LIVE_PERFORMERS_PER_SUBJECT} live performers, the most that one may have"
+            raise ProblemError(403, "Quota used up", detail, hint="end a performer")
+        if len(subjects) >= MAX_LIVE_PERFORMERS:
+            detail = f"this server has {MAX_LIVE_PERFORMERS} live performers"
+            raise ProblemError(503, "Too many performers", detail, hint="end a performer, or try again later")
 
     def _require_quota(self, subject: str | None, additional: int) -> None:
         """Raise `ProblemError` if the subject has too many sessions at all replicas, `additional` ones included."""

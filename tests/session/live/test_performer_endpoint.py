@@ -15,9 +15,9 @@ from bunraku.playout.performance import pack_sample
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.session.cast import Cast, CastMember
-from bunraku.session.cast_store import CastStore
-from bunraku.session.performer_endpoint import (
+from bunraku.session.live.cast import Cast, CastMember
+from bunraku.session.live.cast_store import CastStore
+from bunraku.session.live.performer_endpoint import (
     RECONNECT_TIMEOUT_US,
     REFRESH_INTERVAL_US,
     REPLACED_LIFETIME_US,
@@ -51,6 +51,18 @@ class Editor:
         self.motions.append(motion)
 
 
+class Owner:
+    """Manager of a replica that may be full."""
+
+    def __init__(self, casts: CastStore) -> None:
+        self.casts = casts
+        self.is_full = False
+
+    def require_room(self, subject: str) -> None:
+        if self.is_full:
+            raise ProblemError(503, "Too many performers", f"no room for {subject}")
+
+
 class Opened:
     """Endpoint of a stage with one performer and a clock that a test moves forward."""
 
@@ -77,7 +89,8 @@ class Opened:
         state = timeline.start(motion.id, motion.first_track.duration_us, self.clock())
         self.stage = Stage(SessionStart("s", motion, state, state.clock, cast=cast), self.context.bus, self.clock)
         self.editor = Editor(self.stage)
-        self.endpoint = PerformerEndpoint(self.stage, self.context, self.editor, casts)
+        self.owner = Owner(casts)
+        self.endpoint = PerformerEndpoint(self.stage, self.context, self.editor, self.owner)
         self.endpoint._clock = self.clock
 
     async def close(self) -> None:
@@ -120,6 +133,23 @@ async def test_attached_connection_is_applied_and_others_are_told(opened: Opened
     assert opened.told == ["one", "two", "two"]
     description = await opened.endpoint.operations["performer"](AIKO.id)
     assert (description["name"], description["performer"], description["connected"]) == ("Aiko", 0, True)
+
+
+async def test_performer_that_finds_no_room_changes_nothing(opened: Opened) -> None:
+    yuki = CastMember("s-yuki", "Yuki", 60.0, None)
+    await opened.owner.casts.put_figure(yuki, standard_figure())
+    (values,) = Cast("", (yuki,)).to_values()[1]
+    opened.owner.is_full = True
+    with pytest.raises(ProblemError, match="no room"):
+        await opened.endpoint.operations["perform"](values)
+    assert opened.editor.casts == []
+    opened.owner.is_full = False
+    opened.editor.fails = True
+    with pytest.raises(ProblemError, match="taken over"):
+        await opened.endpoint.operations["perform"](values)
+    with pytest.raises(ProblemError) as unknown:
+        await opened.endpoint.operations["performer"](yuki.id)
+    assert unknown.value.status == 404
 
 
 async def test_connection_that_is_heard_after_a_take_over_is_the_performers(opened: Opened) -> None:

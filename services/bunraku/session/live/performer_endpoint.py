@@ -22,7 +22,8 @@ from bunraku.messaging.performance_request import PERFORMANCE_SUBJECT
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import EMPTY_CAST, Cast, CastMember
+from bunraku.session.live.cast import EMPTY_CAST, Cast, CastMember
+from bunraku.session.live.cast_store import CastStore
 from bunraku.session.stage import Stage
 from bunraku.wire.live import Sample
 from bunraku.wire.messages import unpack
@@ -48,14 +49,14 @@ class CastEditor(Protocol):
         """Save another motion, then show it."""
 
 
-class CastMotions(Protocol):
-    """Store of the motions of casts."""
+class PerformerOwner(Protocol):
+    """Manager of the performers of a replica."""
 
-    async def refresh(self, cast: Cast) -> None:
-        """Store the motions of a cast again."""
+    casts: CastStore
+    """Motions of the casts of all stages."""
 
-    async def remove(self, cast: Cast, kept: Cast) -> None:
-        """Remove the motions of a cast, except those that another cast needs."""
+    def require_room(self, subject: str) -> None:
+        """Raise `ProblemError` unless the replica can show another performer of a subject."""
 
 
 @dataclass(slots=True)
@@ -70,12 +71,13 @@ class _Attachment:
 class PerformerEndpoint:
     """Endpoint of the live performers of one stage."""
 
-    def __init__(self, stage: Stage, context: ServiceContext, editor: CastEditor, casts: CastMotions) -> None:
+    def __init__(self, stage: Stage, context: ServiceContext, editor: CastEditor, owner: PerformerOwner) -> None:
         self._stage = stage
         self._context = context
         self._clock = context.clock
         self._editor = editor
-        self._casts = casts
+        self._owner = owner
+        self._casts = owner.casts
         self._refreshed_at = context.clock()
         # casts that are not shown any more, and since when
         self._replaced: list[tuple[int, Cast]] = []
@@ -109,6 +111,8 @@ class PerformerEndpoint:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        # the editor refers to this object: without the reference both are freed at once
+        del self._editor
 
     def replace(self, cast: Cast) -> None:
         """Remove the motions of a cast that is not shown any more, once nobody asks for them."""
@@ -155,6 +159,7 @@ class PerformerEndpoint:
     async def _answer_perform(self, values: list[Any]) -> dict[str, Any]:
         (member,) = Cast.from_values(["", [values]]).members
         if self._stage.cast.find(member.id) is None:
+            self._owner.require_room(member.subject)
             cast = self._stage.cast if self._stage.cast.members else Cast(self._stage.timeline.motion)
             self._attachments[member.id] = _Attachment(self._clock())
             try:
