@@ -13,6 +13,7 @@ import { createTheme, type ThemeChoice } from "../ui/theme";
 import { AvatarSlots } from "./avatar-slot";
 import { EngineConnection } from "./engine-connection";
 import { Exporter } from "./exporter";
+import { ImmersiveOffer } from "./immersive-offer";
 import { Invitation } from "./invitation";
 import { LibraryController } from "./library-controller";
 import { LimbControls } from "./limb-controls";
@@ -75,6 +76,13 @@ export class App implements AppParts {
       limbs: this.limbs,
       getPlayback: () => this.playback,
       invitation: new Invitation(page.nameTags),
+      immersive: new ImmersiveOffer({
+        page,
+        send,
+        getTheme: () => this.theme.theme,
+        prefersReducedMotion: () => reducedMotion.matches,
+        onPresenting: () => this.stageHost.updateHidden(),
+      }),
       viewOnly: !pageAccess.allows("control"),
       isAlone: view !== null,
       getMapping: () => this.#mapping,

@@ -17,6 +17,7 @@ import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
 import { type EngineConnection, EngineError } from "./engine-connection";
 import { GamepadPolling } from "./gamepad-polling";
+import type { ImmersiveOffer } from "./immersive-offer";
 import type { Invitation } from "./invitation";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
@@ -41,6 +42,7 @@ export interface StageHostOptions {
   engine: EngineConnection;
   limbs: LimbControls;
   invitation: Invitation;
+  immersive: ImmersiveOffer;
   /** True if this page may not claim limbs. */
   viewOnly: boolean;
   /** True if the stage is shown without the page around it, and without inputs. */
@@ -75,13 +77,21 @@ export class StageHost {
     this.#showLimbs(NO_CLAIMS);
     this.resize();
     addEventListener("resize", () => this.resize());
-    if (!this.options.isAlone) this.#listenToInputs();
+    if (!this.options.isAlone) {
+      this.#listenToInputs();
+      this.options.startup.runWhenFinished(() => this.options.immersive.watch());
+    }
     // A page in the background draws no frames, so nothing would release the inputs that were pressed.
     document.addEventListener("visibilitychange", () => {
-      this.#setSettings({ isHidden: document.hidden });
+      this.updateHidden();
       if (document.hidden) this.options.limbs.commands.releaseAll();
     });
     await engine.start(await worker);
+  }
+
+  /** Tell the engine whether anybody sees the stage: on the page, or in VR. */
+  updateHidden(): void {
+    this.#setSettings({ isHidden: document.hidden && !this.options.immersive.isPresenting });
   }
 
   setTheme(theme: Theme): void {
@@ -157,7 +167,7 @@ export class StageHost {
 
   /** Handle an event of the engine. */
   onEvent(event: EngineEvent): void {
-    const { invitation, limbs, page, startup, viewOnly } = this.options;
+    const { immersive, invitation, limbs, page, startup, viewOnly } = this.options;
     const playback = this.options.getPlayback();
     switch (event.type) {
       case "ready":
@@ -200,6 +210,7 @@ export class StageHost {
         const { ask } = event;
         if (ask) page.toast(event.message, { label: ask.label, key: ask.key, run: () => limbs.act("ask", ask.limb) });
         else page.toast(event.message);
+        immersive.showMessage(event.message);
         break;
       }
       case "limb notice":
@@ -213,6 +224,9 @@ export class StageHost {
         break;
       case "unauthorized":
         playback.onUnauthorized(event);
+        break;
+      case "immersive frame":
+        immersive.onFrame(event.frame);
         break;
       case "graphics":
         this.#showContextLoss(event.isLost);
@@ -233,6 +247,7 @@ export class StageHost {
     page.strings.render(limbs, isReady, performer);
     page.limbRequests.render(limbs, giveKey);
     page.library.danceAs.dancers(limbs, performer);
+    this.options.immersive.onLimbs(state);
   }
 
   #listenToInputs(): void {

@@ -6,6 +6,7 @@ import { AvatarError } from "../avatar/error";
 import { Access } from "../client/access";
 import { ProblemError } from "../client/problem";
 import { createPageActions } from "../input/command-dispatcher";
+import type { HandState } from "../input/hand";
 import { DEFAULT_MAPPING } from "../input/mapping";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import { type Graphics, openGraphics } from "../stage/rendering/graphics";
@@ -57,6 +58,8 @@ export class Engine {
   #playbackNumber = 0;
   readonly #statisticsTimer: ReturnType<typeof setInterval>;
   #isClosed = false;
+  /** True while an immersive session shows the stage: it requests the frames. */
+  #isImmersive = false;
   #lastState: StageState | null = null;
   #lastPosition = NaN;
 
@@ -187,6 +190,13 @@ export class Engine {
       case "lead":
         this.#setLead(command.lead);
         break;
+      case "immersive":
+        this.#isImmersive = command.isPresenting;
+        this.#controller?.setImmersive(command.isPresenting);
+        break;
+      case "immersive frame":
+        this.#sendImmersiveFrame(command.hands);
+        break;
       case "request":
         void this.#respond(command.id, command.request);
         break;
@@ -270,11 +280,20 @@ export class Engine {
     if (this.#isClosed) return;
     requestAnimationFrame(() => this.#drawFrame());
     const controller = this.#controller;
-    if (!controller || !this.#describeStage) return;
+    if (!controller || !this.#describeStage || this.#isImmersive) return;
     const now = performance.now();
     const frame = controller.draw(now, this.#settings.focusedLimb);
     // What lies over the stage moves with what the canvas shows.
     if (controller.stage.isUpToDate) this.#sendFrame(this.#describeStage(controller, frame, this.#labels, now), now);
+    this.#playback?.viewer.recordFrame(performance.now() - now);
+  }
+
+  /** Send the next frame of an immersive session, which has nothing to show without a stage. */
+  #sendImmersiveFrame(hands: readonly HandState[]): void {
+    const controller = this.#controller;
+    if (!controller || !this.#isImmersive) return;
+    const now = performance.now();
+    this.send({ type: "immersive frame", frame: controller.advanceImmersive(now, hands) });
     this.#playback?.viewer.recordFrame(performance.now() - now);
   }
 

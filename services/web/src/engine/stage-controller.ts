@@ -3,11 +3,13 @@
  * in a worker or in the page.
  */
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
+import { HandInput, type HandState } from "../input/hand";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
 import { createPointerInput, type PointerInput } from "../input/pointer";
 import { VelocityInputs } from "../input/velocity-input";
-import type { Pose } from "../motion/skeleton";
+import type { Figure, Pose } from "../motion/skeleton";
+import type { LightState } from "../playout/light-state";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import type { Graphics } from "../stage/rendering/graphics";
 import { Stage } from "../stage/stage";
@@ -15,6 +17,7 @@ import type { StringState } from "../stage/strings/strings";
 import type { LimbState } from "../ui/limb-state";
 import { performerOfLimb } from "../wire/limbs";
 import type { ClaimController } from "./claim-controller";
+import type { ImmersiveFrame } from "./message";
 import type { Playback } from "./playback";
 
 export interface StageControllerOptions {
@@ -43,15 +46,30 @@ export interface FrameState {
   limbs: readonly LimbState[];
 }
 
+/** What the stage shows at one instant. */
+interface StageContent {
+  poses: readonly (Pose | null)[];
+  limbs: readonly LimbState[];
+  strings: readonly StringState[];
+  /** Seconds since the last one. */
+  seconds: number;
+}
+
 export class StageController {
   readonly stage: Stage;
   readonly hands: LimbController;
   readonly pointer: PointerInput;
+  /** Hands of an immersive session. */
+  readonly handInput: HandInput;
   readonly velocity: VelocityInputs;
   readonly commands: CommandDispatcher;
   readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
   #lastDrawMs = 0;
+  /** Figures of the performers, new ones with each change. */
+  #figures: readonly Figure[] = [];
+  /** Figures that the immersive session was told of; null before its first frame. */
+  #immersiveFigures: readonly Figure[] | null = null;
   /** Last selected performer, and the time in milliseconds until which its rings are highlighted. */
   #ringHighlight = { performer: 0, until: 0 };
 
@@ -89,6 +107,16 @@ export class StageController {
       smoothing: () => getMapping().pointerSmoothing,
       depthInput: (limb) => this.velocity.depthInput(limb),
     });
+    this.handInput = new HandInput(this.stage, this.hands, {
+      selectedPerformer: () => selection.performer,
+      isFree,
+      isHeldByOther: (limb) => limbController.isHeldByOther(limb),
+      onClaimed: (limb) => selection.select(performerOfLimb(limb)),
+      ask: (limb) => limbController.requestLimb(limb),
+      isAsking: (limb) => limbController.isAsking(limb),
+      withdraw: (limb) => limbController.withdrawRequest(limb),
+      smoothing: () => getMapping().pointerSmoothing,
+    });
     this.commands = new CommandDispatcher(this.hands, this.velocity, actions);
     limbController.stageInputs = {
       hands: this.hands,
@@ -112,21 +140,61 @@ export class StageController {
   /** Show the performers of the playback, as far as their skeletons were received. */
   updatePerformers(): void {
     const { performers = [], figure, front } = this.#playback?.viewer ?? {};
+    if (!figure) return;
     // A performer whose track cannot be decoded keeps its index, and is never drawn.
-    if (figure)
-      this.stage.setFigures(
-        performers.map((performer) => performer?.figure ?? figure),
-        front,
-      );
+    this.#figures = performers.map((performer) => performer?.figure ?? figure);
+    this.stage.setFigures(this.#figures, front);
   }
 
   /** Draw the frame of local time `now` in milliseconds. `focusedLimb` is the limb whose control has the focus. */
   draw(now: number, focusedLimb: number | null = null): FrameState {
-    const { limbController, hands, pointer, stage, velocity } = this;
+    const { limbController, pointer, stage } = this;
+    const viewer = this.#playback?.viewer;
+    pointer.update(now);
+    const { poses, limbs, strings, seconds } = this.#advance(now, focusedLimb);
+    // The camera must not move under a finger that drags a limb.
+    if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : this.selectedPerformer;
+    const camera = this.#camera ?? viewer?.cameraAt(now);
+    stage.draw(poses, strings, seconds, camera, this.#lightsAt(now), viewer?.presentationTime(now));
+    return { pose: poses[0] ?? null, limbs };
+  }
+
+  /** Begin or end an immersive session, which shows the stage in place of the canvas. */
+  setImmersive(isPresenting: boolean): void {
+    this.stage.isPaused = isPresenting;
+    this.#immersiveFigures = null;
+    if (!isPresenting) this.handInput.releaseAll();
+  }
+
+  /** Apply the hands of an immersive session at local time `now` in milliseconds, and return what it shows then. */
+  advanceImmersive(now: number, hands: readonly HandState[]): ImmersiveFrame {
+    const viewer = this.#playback?.viewer;
+    const grips = this.limbController.viewOnly ? [] : this.handInput.update(hands, now);
+    const { poses, strings, seconds } = this.#advance(now, null);
+    this.stage.draw(poses, strings, seconds);
+    const figures = this.#figures === this.#immersiveFigures ? null : this.#figures;
+    this.#immersiveFigures = this.#figures;
+    return {
+      figures,
+      front: viewer?.front ?? 0,
+      poses,
+      strings: strings.map((string) => ({ ...string, pullTarget: string.pullTarget?.toArray() ?? null })),
+      lights: this.#lightsAt(now),
+      performer: this.selectedPerformer,
+      grips,
+    };
+  }
+
+  #lightsAt(now: number): readonly LightState[] {
+    return this.#playback?.viewer.lightsAt(now) ?? [];
+  }
+
+  /** Advance limbs that move by velocity, and return the content of the stage at local time `now` in milliseconds. */
+  #advance(now: number, focusedLimb: number | null): StageContent {
+    const { handInput, hands, limbController, pointer, velocity } = this;
     const viewer = this.#playback?.viewer;
     const seconds = (now - this.#lastDrawMs) / 1000;
     this.#lastDrawMs = now;
-    pointer.update(now);
     velocity.update(now);
     const poses = viewer?.performers.map((_, performer) => viewer.poseAt(now, performer)) ?? [];
     const limbs = limbController.limbStates();
@@ -136,7 +204,8 @@ export class StageController {
         performer: selection.performer,
         until: selection.count > 1 ? now + RING_HIGHLIGHT_MS : 0,
       };
-    const states = limbs.map(({ holder, selected }, limb): StringState => {
+    const { limbsInReach } = handInput;
+    const strings = limbs.map(({ holder, selected }, limb): StringState => {
       const isSelected = performerOfLimb(limb) === selection.performer;
       return {
         puppeteer: holder?.colour ?? null,
@@ -144,16 +213,13 @@ export class StageController {
           pointer.hoveredLimb === limb ||
           focusedLimb === limb ||
           selected ||
+          limbsInReach.includes(limb) ||
           (isSelected && now < this.#ringHighlight.until),
         pullTarget: hands.pullTarget(limb),
         isDimmed: !isSelected,
       };
     });
-    // The camera must not move under a finger that drags a limb.
-    if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : selection.performer;
-    const camera = this.#camera ?? viewer?.cameraAt(now);
-    stage.draw(poses, states, seconds, camera, viewer?.lightsAt(now), viewer?.presentationTime(now));
-    return { pose: poses[0] ?? null, limbs };
+    return { poses, limbs, strings, seconds };
   }
 
   /**
