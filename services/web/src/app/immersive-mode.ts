@@ -109,6 +109,7 @@ export class ImmersiveMode {
         onSize: (size) => this.#showSize(size),
         onGraphicsLost: () => host.page.toast(translate(GRAPHICS_LOST)),
       });
+      this.#exposeDebugHandle();
       host.send({ type: "immersive", isPresenting: true });
       host.onPresenting();
       await this.#view.start();
@@ -128,10 +129,17 @@ export class ImmersiveMode {
     this.#session = null;
     if (this.#view) {
       this.#view = null;
+      this.#exposeDebugHandle();
       this.host.send({ type: "immersive", isPresenting: false });
       this.host.onPresenting();
     }
     this.#render();
+  }
+
+  /** Add the session to `window.bunraku`, where tests and developers find the parts of the page. */
+  #exposeDebugHandle(): void {
+    const global = globalThis as { bunraku?: object };
+    global.bunraku = { ...global.bunraku, immersive: this.#view };
   }
 
   #setSize(size: StageSize): void {

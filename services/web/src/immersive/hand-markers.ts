@@ -1,6 +1,5 @@
 /** Hands as the viewer of an immersive session sees them: a sphere at each joint or grip, and a beam to the string. */
 import {
-  Color,
   CylinderGeometry,
   Group,
   InstancedMesh,
@@ -21,12 +20,9 @@ const GRIP_RADIUS_M = 0.018;
 const BEAM_RADIUS_M = 0.0016;
 /** Length of the beam of a hand that points at nothing. */
 const POINTER_LENGTH_M = 0.5;
-const COLOURS: Readonly<Record<HandGrip["kind"], string>> = {
-  open: "#efe4cf",
-  empty: "#8a8277",
-  holding: "#f2b84b",
-  asking: "#e2604f",
-};
+type Colours = Readonly<Record<HandGrip["kind"], string>>;
+const DARK_LOOK: Colours = { open: "#efe4cf", empty: "#8a8277", holding: "#f2b84b", asking: "#e2604f" };
+const LIGHT_LOOK: Colours = { open: "#5d5040", empty: "#a3988a", holding: "#8f5200", asking: "#a52c2c" };
 
 const UP = new Vector3(0, 1, 0);
 
@@ -37,14 +33,14 @@ class HandMarker {
   readonly #beam = new Mesh(new CylinderGeometry(1, 1, 1, 6).translate(0, 0.5, 0), this.#material);
   readonly #matrix = new Matrix4();
 
-  constructor() {
+  constructor(private readonly colours: Colours) {
     this.group.add(this.#joints, this.#beam);
     for (const part of [this.#joints, this.#beam]) part.frustumCulled = false;
   }
 
   /** `target` is the place in the room that the beam leads to; null for none. */
   update({ position, origin, direction, joints }: RoomHand, kind: HandGrip["kind"], target: Vector3 | null): void {
-    this.#material.color.copy(new Color(COLOURS[kind]));
+    this.#material.color.set(this.colours[kind]);
     const radius = joints.length > 0 ? JOINT_RADIUS_M : GRIP_RADIUS_M;
     const places = joints.length > 0 ? joints.slice(0, MAX_JOINTS) : [position];
     this.#joints.count = places.length;
@@ -70,9 +66,11 @@ class HandMarker {
 
 export class HandMarkers {
   readonly group = new Group();
-  readonly #markers = [new HandMarker(), new HandMarker()];
+  readonly #markers: readonly HandMarker[];
 
-  constructor() {
+  /** `isDark` is true if the markers are seen in the night look. */
+  constructor(isDark: boolean) {
+    this.#markers = [0, 1].map(() => new HandMarker(isDark ? DARK_LOOK : LIGHT_LOOK));
     this.group.add(...this.#markers.map(({ group }) => group));
   }
 

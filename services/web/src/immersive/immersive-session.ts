@@ -4,10 +4,10 @@
  */
 import { Matrix4, type Vector3, type WebGLRenderer } from "three";
 import type { ImmersiveFrame } from "../engine/message";
-import type { HandState, Triple } from "../input/hand";
+import type { HandGrip, HandState, Triple } from "../input/hand";
 import { readDriverName } from "../stage/rendering/graphics";
 import { AdaptiveQuality } from "../stage/rendering/quality";
-import type { Theme } from "../stage/scenery/look";
+import { LOOKS, type Theme } from "../stage/scenery/look";
 import type { ImmersiveAction } from "./controller";
 import { FrameRateGuard } from "./frame-rate-guard";
 import { GripPulses } from "./grip-pulse";
@@ -41,7 +41,7 @@ export class ImmersiveSession {
   readonly #renderer: WebGLRenderer;
   readonly #stage: ImmersiveStage;
   readonly #board = new MessageBoard();
-  readonly #markers = new HandMarkers();
+  readonly #markers: HandMarkers;
   readonly #reader = new HandReader();
   readonly #pulses = new GripPulses();
   readonly #guard = new FrameRateGuard();
@@ -51,6 +51,8 @@ export class ImmersiveSession {
   /** Figures of a frame that was replaced before it was shown. */
   #figures: ImmersiveFrame["figures"] = null;
   #hands: readonly RoomHand[] = [];
+  /** Message to be shown at the next frame. */
+  #message: string | null = null;
   #requestedAt = -Infinity;
   #drawnAt = 0;
   #shownAt = 0;
@@ -65,6 +67,7 @@ export class ImmersiveSession {
     this.#isSimple = new AdaptiveQuality(readDriverName() ?? "", false).quality.simpleMaterials;
     this.#renderer = createImmersiveRenderer(!this.#isSimple);
     this.#stage = new ImmersiveStage(this.#renderer, { theme, size, isSimple: this.#isSimple, reducedMotion });
+    this.#markers = new HandMarkers(LOOKS[theme].dark);
     this.#stage.room.add(this.#markers.group, this.#board.mesh);
     this.#renderer.domElement.addEventListener("webglcontextlost", () => this.#onGraphicsLost());
     session.addEventListener("end", () => this.#dispose());
@@ -84,13 +87,24 @@ export class ImmersiveSession {
     this.#pulses.update(frame.grips, (name) => this.#hands.find((hand) => hand.name === name)?.source.gamepad ?? null);
   }
 
-  /** Show a short message in the room. */
+  /** What each tracked hand does. */
+  get grips(): readonly HandGrip[] {
+    return this.#frame?.grips ?? [];
+  }
+
+  /** Return the position of a limb's ring in the room, null if its performer is not shown. */
+  ringInRoom(limb: number): Vector3 | null {
+    const toRoom = this.#stage.placement.matrix.clone().invert();
+    return this.#stage.ringOf(limb)?.applyMatrix4(toRoom) ?? null;
+  }
+
+  /** Show a short message in the room, at the next frame. */
   showMessage(text: string): void {
-    this.#board.show(text, this.#viewer);
+    this.#message = text;
   }
 
   setSize(size: StageSize): void {
-    this.#stage.setSize(size);
+    this.#stage.size = size;
   }
 
   #draw(now: number, frame?: XRFrame): void {
@@ -107,9 +121,11 @@ export class ImmersiveSession {
     this.#stage.camera.matrix.copy(this.#viewer);
     this.#readHands(frame, space, now);
     this.#show(now);
+    if (this.#message !== null) this.#board.show(this.#message, this.#viewer);
+    this.#message = null;
     this.#board.update(interval);
     this.#stage.updateMatrices();
-    this.#markers.update(this.#hands, this.#frame?.grips ?? [], (limb) => this.#ringInRoom(limb));
+    this.#markers.update(this.#hands, this.grips, (limb) => this.ringInRoom(limb));
     drawFrame(this.#renderer, this.#stage.scene, this.#stage.camera);
   }
 
@@ -126,13 +142,13 @@ export class ImmersiveSession {
 
   #run(action: ImmersiveAction): void {
     const { options } = this;
-    const { placement } = this.#stage;
+    const stage = this.#stage;
     if (action === "next performer") options.selectNextPerformer();
     else if (action === "size") {
-      const size = placement.size === "1:1" ? "1:4" : "1:1";
-      this.#stage.setSize(size);
-      options.onSize(size);
-    } else if (!this.#isHolding) placement.turn(action === "turn left" ? SNAP_TURN_RAD : -SNAP_TURN_RAD, this.#viewer);
+      stage.size = stage.size === "1:1" ? "1:4" : "1:1";
+      options.onSize(stage.size);
+    } else if (!this.#isHolding)
+      stage.placement.turn(action === "turn left" ? SNAP_TURN_RAD : -SNAP_TURN_RAD, this.#viewer);
   }
 
   /** Show the last frame of the engine, if it is a new one. */
@@ -159,11 +175,6 @@ export class ImmersiveSession {
       reach: REACH_M * stagePerRoom,
       isClosed,
     };
-  }
-
-  #ringInRoom(limb: number): Vector3 | null {
-    const toRoom = this.#stage.placement.matrix.clone().invert();
-    return this.#stage.ringOf(limb)?.applyMatrix4(toRoom) ?? null;
   }
 
   #onGraphicsLost(): void {

@@ -64,6 +64,7 @@ export class ImmersiveStage {
   #front = 0;
   #isPlaced = false;
   #performer = 0;
+  #size: StageSize;
 
   /** `renderer` does not present a session yet: textures are drawn with it first. */
   constructor(
@@ -71,6 +72,7 @@ export class ImmersiveStage {
     private readonly options: ImmersiveStageOptions,
   ) {
     const { theme, size, isSimple, reducedMotion } = options;
+    this.#size = size;
     this.placement = new Placement(size);
     this.strings.reducedMotion = reducedMotion;
     // A vignette is a property of a picture, not of a room.
@@ -116,10 +118,13 @@ export class ImmersiveStage {
     this.#applyQuality(true);
   }
 
-  /** Use another size; the stage is placed anew in front of the viewer. */
-  setSize(size: StageSize): void {
-    this.placement.size = size;
-    this.#isPlaced = false;
+  /** Size of the stage. Another one is placed anew in front of the viewer, as soon as no hand pulls a limb. */
+  get size(): StageSize {
+    return this.#size;
+  }
+
+  set size(size: StageSize) {
+    this.#size = size;
   }
 
   /**
@@ -201,7 +206,8 @@ export class ImmersiveStage {
   #place(spot: Vector3, performer: number, canMove: boolean): void {
     const { placement } = this;
     placement.setGround(this.#floorHeight.value);
-    if (!this.#isPlaced) {
+    if (!this.#isPlaced || (canMove && placement.size !== this.#size)) {
+      placement.size = this.#size;
       placement.place(this.camera.matrix, { centre: spot.setY(this.#floorHeight.value), front: this.#front });
       this.#isPlaced = true;
     } else if (canMove && (performer !== this.#performer || placement.isFar(spot))) placement.moveTo(spot);

@@ -16,7 +16,7 @@ export interface StageSpot {
 /** Metres of the room per metre of the stage. */
 const SCALES: Readonly<Record<StageSize, number>> = { "1:1": 1, "1:4": 0.25 };
 /** Distance between the viewer and the centre of the stage, in metres of the room. */
-const DISTANCES_M: Readonly<Record<StageSize, number>> = { "1:1": 1.3, "1:4": 0.6 };
+const DISTANCES_M: Readonly<Record<StageSize, number>> = { "1:1": 1, "1:4": 0.55 };
 /** A small stage is this far below the viewer's eyes, like a table, within these limits, in metres of the room. */
 const TABLE_DEPTH_M = 0.72;
 const TABLE_HEIGHT_M = [0.35, 1.1] as const;

@@ -1,0 +1,89 @@
+/** A headset that is emulated in a page, with controllers and tracked hands (`iwer`). */
+import { fileURLToPath } from "node:url";
+import type { XRDevice } from "iwer";
+import type { Page } from "playwright-core";
+import type { ImmersiveSession } from "../../src/immersive/immersive-session";
+import type { HandGrip } from "../../src/input/hand";
+import type { Position } from "./page-probe";
+
+type Side = "left" | "right";
+
+interface HeadsetWindow {
+  IWER: typeof import("iwer");
+  headset: XRDevice;
+  bunraku: { immersive: ImmersiveSession | null };
+}
+
+/** Connect a headset to a page, before its scripts. */
+export async function connectHeadset(page: Page): Promise<void> {
+  await page.addInitScript({ path: fileURLToPath(import.meta.resolve("iwer/build/iwer.min.js")) });
+  await page.addInitScript(() => {
+    const scope = globalThis as unknown as HeadsetWindow;
+    scope.headset = new scope.IWER.XRDevice(scope.IWER.metaQuest3);
+    scope.headset.installRuntime({ forceInstall: true });
+  });
+}
+
+/** Enter VR by its button, and wait for the first frame with a performer. */
+export async function enterVr(page: Page): Promise<void> {
+  await page.getByRole("button", { name: "Enter VR" }).click();
+  await page.waitForFunction(() => (globalThis as unknown as HeadsetWindow).bunraku.immersive?.ringInRoom(0) ?? false);
+}
+
+/** Leave VR as by the system's menu. */
+export async function leaveVr(page: Page): Promise<void> {
+  await page.evaluate(() => (globalThis as unknown as HeadsetWindow).headset.activeSession?.end());
+  await page.getByRole("button", { name: "Enter VR" }).waitFor();
+}
+
+/** Return the position of a limb's ring in the room. */
+export function ringInRoom(page: Page, limb: number): Promise<Position> {
+  return page.evaluate(
+    (limb) => (globalThis as unknown as HeadsetWindow).bunraku.immersive?.ringInRoom(limb)?.toArray() as Position,
+    limb,
+  );
+}
+
+/** Move a controller or a tracked hand, whichever the headset follows. */
+export async function moveHand(page: Page, side: Side, at: Position): Promise<void> {
+  await page.evaluate(
+    ({ side, at }) => {
+      const { headset } = globalThis as unknown as HeadsetWindow;
+      for (const input of [headset.controllers[side], headset.hands[side]]) input?.position.set(...at);
+    },
+    { side, at },
+  );
+}
+
+/** Use tracked hands in place of controllers. */
+export async function trackHands(page: Page): Promise<void> {
+  await page.evaluate(() => void ((globalThis as unknown as HeadsetWindow).headset.primaryInputMode = "hand"));
+}
+
+/** Press or release a button of a controller. */
+export async function setButton(page: Page, side: Side, button: string, value: number): Promise<void> {
+  await page.evaluate(
+    ({ side, button, value }) =>
+      (globalThis as unknown as HeadsetWindow).headset.controllers[side]?.updateButtonValue(button, value),
+    { side, button, value },
+  );
+}
+
+/** Pinch with a tracked hand, 0 (open) to 1. */
+export async function pinch(page: Page, side: Side, value: number): Promise<void> {
+  await page.evaluate(
+    ({ side, value }) => (globalThis as unknown as HeadsetWindow).headset.hands[side]?.updatePinchValue(value),
+    { side, value },
+  );
+}
+
+/** Wait until a hand does something, perhaps with a limb. */
+export async function waitForGrip(page: Page, side: Side, kind: HandGrip["kind"], limb?: number): Promise<void> {
+  await page.waitForFunction(
+    ({ side, kind, limb }) =>
+      (globalThis as unknown as HeadsetWindow).bunraku.immersive?.grips.some(
+        (grip) => grip.name === side && grip.kind === kind && (limb === undefined || grip.limb === limb),
+      ),
+    { side, kind, limb },
+  );
+}
