@@ -19,7 +19,12 @@ export const REPLACED_MODULES: Readonly<Record<string, string>> = {
       dispose() {}
     }`,
   // Only the cameras of such a session are arrays. It culls nothing.
-  "math/FrustumArray.js": "export class FrustumArray { setFromArrayCamera() { return this; } }",
+  "math/FrustumArray.js": `
+    export class FrustumArray {
+      setFromArrayCamera() { return this; }
+      intersectsObject() { return true; }
+      intersectsSprite() { return true; }
+    }`,
   // No material has groups of uniforms.
   "renderers/webgl/WebGLUniformsGroups.js": "export function WebGLUniformsGroups() { this.dispose = () => {}; }",
   // The canvas has 8 bits per channel, so the renderer creates no output pass.

@@ -81,6 +81,7 @@ export class App implements AppParts {
         send,
         getTheme: () => this.theme.theme,
         prefersReducedMotion: () => reducedMotion.matches,
+        getAvatarFiles: () => this.avatarSlots.activeFiles,
         onPresenting: () => this.stageHost.updateHidden(),
       }),
       viewOnly: !pageAccess.allows("control"),

@@ -14,6 +14,8 @@ export interface ImmersiveHost {
   send(command: EngineCommand): void;
   getTheme(): Theme;
   prefersReducedMotion(): boolean;
+  /** Return the files of the avatars that replace puppets, by performer. */
+  getAvatarFiles(): readonly (File | null)[];
   /** Called when VR has begun to show the stage, and when it has ended. */
   onPresenting(): void;
 }
@@ -104,6 +106,7 @@ export class ImmersiveMode {
         theme: host.getTheme(),
         size: this.#size,
         reducedMotion: host.prefersReducedMotion(),
+        avatarFiles: host.getAvatarFiles(),
         requestFrame: (hands) => host.send({ type: "immersive frame", hands }),
         selectNextPerformer: () => host.send({ type: "performer", performer: "next" }),
         onSize: (size) => this.#showSize(size),

@@ -210,6 +210,7 @@ export class Engine {
     canvas.addEventListener("webglcontextrestored", () => this.send({ type: "graphics", isLost: false }));
     this.#avatars.stage = controller.stage;
     this.#applySettings(this.#settings);
+    if (this.#isImmersive) controller.setImmersive(true);
     controller.setPlayback(this.#playback);
     this.#exposeDebugHandle();
   }

@@ -3,6 +3,7 @@
  * engine stays where it is, with its connections and claims; each of its frames is requested by one of the headset's.
  */
 import { Matrix4, type Vector3, type WebGLRenderer } from "three";
+import { AvatarModels } from "../engine/avatar-models";
 import type { ImmersiveFrame } from "../engine/message";
 import type { HandGrip, HandState, Triple } from "../input/hand";
 import { readDriverName } from "../stage/rendering/graphics";
@@ -28,6 +29,8 @@ export interface ImmersiveSessionOptions {
   readonly theme: Theme;
   readonly size: StageSize;
   readonly reducedMotion: boolean;
+  /** Files of the avatars that replace puppets, by performer. */
+  readonly avatarFiles: readonly (File | null)[];
   /** Pass the hands to the engine, and request its next frame. */
   requestFrame(hands: readonly HandState[]): void;
   selectNextPerformer(): void;
@@ -38,9 +41,10 @@ export interface ImmersiveSessionOptions {
 }
 
 export class ImmersiveSession {
+  readonly stage: ImmersiveStage;
   readonly #renderer: WebGLRenderer;
-  readonly #stage: ImmersiveStage;
   readonly #board = new MessageBoard();
+  readonly #avatars = new AvatarModels();
   readonly #markers: HandMarkers;
   readonly #reader = new HandReader();
   readonly #pulses = new GripPulses();
@@ -57,6 +61,7 @@ export class ImmersiveSession {
   #drawnAt = 0;
   #shownAt = 0;
   #isSimple: boolean;
+  #isOver = false;
 
   /** Prepare the stage for `session`. Throw if the browser cannot draw it. */
   constructor(
@@ -66,17 +71,29 @@ export class ImmersiveSession {
     const { theme, size, reducedMotion } = options;
     this.#isSimple = new AdaptiveQuality(readDriverName() ?? "", false).quality.simpleMaterials;
     this.#renderer = createImmersiveRenderer(!this.#isSimple);
-    this.#stage = new ImmersiveStage(this.#renderer, { theme, size, isSimple: this.#isSimple, reducedMotion });
+    this.stage = new ImmersiveStage(this.#renderer, { theme, size, isSimple: this.#isSimple, reducedMotion });
+    this.#avatars.stage = this.stage;
     this.#markers = new HandMarkers(LOOKS[theme].dark);
-    this.#stage.room.add(this.#markers.group, this.#board.mesh);
+    this.stage.room.add(this.#markers.group, this.#board.mesh);
     this.#renderer.domElement.addEventListener("webglcontextlost", () => this.#onGraphicsLost());
-    session.addEventListener("end", () => this.#dispose());
+    // Without frames nothing else would let go of the strings: the headset was taken off, or shows a menu.
+    session.addEventListener("visibilitychange", () => {
+      if (session.visibilityState !== "visible") options.requestFrame([]);
+    });
   }
 
-  /** Show the stage until the session ends. */
+  /** Show the stage until the session ends. Rejects if it ends before. */
   async start(): Promise<void> {
     this.#renderer.setAnimationLoop((now: number, frame?: XRFrame) => this.#draw(now, frame));
-    await this.#renderer.xr.setSession(this.session);
+    try {
+      await this.#renderer.xr.setSession(this.session);
+    } catch (error) {
+      this.#dispose();
+      throw error;
+    }
+    this.options.avatarFiles.forEach((file, performer) => void (file && this.#loadAvatar(performer, file)));
+    // three.js registered its listener earlier: it has let go of the session by then.
+    this.session.addEventListener("end", () => this.#dispose());
   }
 
   /** Take a frame of the engine. */
@@ -94,8 +111,8 @@ export class ImmersiveSession {
 
   /** Return the position of a limb's ring in the room, null if its performer is not shown. */
   ringInRoom(limb: number): Vector3 | null {
-    const toRoom = this.#stage.placement.matrix.clone().invert();
-    return this.#stage.ringOf(limb)?.applyMatrix4(toRoom) ?? null;
+    const toRoom = this.stage.placement.matrix.clone().invert();
+    return this.stage.ringOf(limb)?.applyMatrix4(toRoom) ?? null;
   }
 
   /** Show a short message in the room, at the next frame. */
@@ -104,7 +121,15 @@ export class ImmersiveSession {
   }
 
   setSize(size: StageSize): void {
-    this.#stage.size = size;
+    this.stage.size = size;
+  }
+
+  /** Replace a puppet by an avatar. One that does not load was usable on the page: the puppet dances in its place. */
+  async #loadAvatar(performer: number, file: File): Promise<void> {
+    const name = await this.#avatars.load(performer, file).catch(() => null);
+    if (name === null) return;
+    if (this.#isOver) this.#avatars.remove(performer);
+    else this.#avatars.setActive(performer, true);
   }
 
   #draw(now: number, frame?: XRFrame): void {
@@ -115,18 +140,18 @@ export class ImmersiveSession {
     this.#drawnAt = now;
     if (!this.#isSimple && this.#guard.add(interval)) {
       this.#isSimple = true;
-      this.#stage.simplify();
+      this.stage.simplify();
     }
     this.#viewer.fromArray(pose.transform.matrix);
-    this.#stage.camera.matrix.copy(this.#viewer);
+    this.stage.camera.matrix.copy(this.#viewer);
     this.#readHands(frame, space, now);
     this.#show(now);
     if (this.#message !== null) this.#board.show(this.#message, this.#viewer);
     this.#message = null;
     this.#board.update(interval);
-    this.#stage.updateMatrices();
+    this.stage.updateMatrices();
     this.#markers.update(this.#hands, this.grips, (limb) => this.ringInRoom(limb));
-    drawFrame(this.#renderer, this.#stage.scene, this.#stage.camera);
+    drawFrame(this.#renderer, this.stage.scene, this.stage.camera);
   }
 
   #readHands(frame: XRFrame, space: XRReferenceSpace, now: number): void {
@@ -142,7 +167,7 @@ export class ImmersiveSession {
 
   #run(action: ImmersiveAction): void {
     const { options } = this;
-    const stage = this.#stage;
+    const stage = this.stage;
     if (action === "next performer") options.selectNextPerformer();
     else if (action === "size") {
       stage.size = stage.size === "1:1" ? "1:4" : "1:1";
@@ -155,7 +180,7 @@ export class ImmersiveSession {
   #show(now: number): void {
     if (!this.#frame || this.#frame === this.#shownFrame) return;
     const seconds = (now - this.#shownAt) / 1000;
-    this.#stage.apply({ ...this.#frame, figures: this.#figures }, seconds, !this.#isHolding);
+    this.stage.apply({ ...this.#frame, figures: this.#figures }, seconds, !this.#isHolding);
     this.#figures = null;
     [this.#shownFrame, this.#shownAt] = [this.#frame, now];
   }
@@ -166,7 +191,7 @@ export class ImmersiveSession {
   }
 
   #onStage({ name, position, origin, direction, isClosed }: RoomHand): HandState {
-    const { matrix, stagePerRoom } = this.#stage.placement;
+    const { matrix, stagePerRoom } = this.stage.placement;
     return {
       name,
       position: position.clone().applyMatrix4(matrix).toArray() as Triple,
@@ -178,13 +203,18 @@ export class ImmersiveSession {
   }
 
   #onGraphicsLost(): void {
+    if (this.#isOver) return;
     // The browser has ended the session if the headset was lost with them.
     void this.session.end().catch(() => undefined);
     this.options.onGraphicsLost();
   }
 
   #dispose(): void {
+    this.#isOver = true;
     this.#renderer.setAnimationLoop(null);
-    for (const part of [this.#stage, this.#markers, this.#board, this.#renderer]) part.dispose();
+    this.options.avatarFiles.forEach((_, performer) => void this.#avatars.remove(performer));
+    for (const part of [this.stage, this.#markers, this.#board, this.#renderer]) part.dispose();
+    // Frees the context's memory at once: browsers keep few contexts and would take one from another stage.
+    this.#renderer.forceContextLoss();
   }
 }

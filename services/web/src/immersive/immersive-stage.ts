@@ -15,7 +15,7 @@ import {
 } from "three";
 import type { ImmersiveFrame } from "../engine/message";
 import { FollowRig } from "../stage/camera/follow-rig";
-import { PerformerGroup } from "../stage/puppet/performer-group";
+import { type PerformerFactory, PerformerGroup } from "../stage/puppet/performer-group";
 import { createEnvironmentMap } from "../stage/scenery/environment-map";
 import { createLights } from "../stage/scenery/lighting";
 import { LOOKS, type Look, type Theme } from "../stage/scenery/look";
@@ -164,6 +164,12 @@ export class ImmersiveStage {
         distanceScale: 1,
       },
     );
+  }
+
+  /** Set the factory of a performer (an index); null restores the puppet. */
+  setPerformerFactory(factory: PerformerFactory | null, performer = 0): void {
+    this.#performerGroup.setPerformerFactory(factory, performer);
+    if (factory) this.renderer.compile(this.scene, this.camera);
   }
 
   /** Position of a limb's ring, null if its performer is not shown. */

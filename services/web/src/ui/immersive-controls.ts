@@ -26,7 +26,7 @@ export function createImmersiveControls(actions: { toggle(): void; resize(): voi
   );
   const size = element("button", { class: "round-button immersive-size", type: "button", onClick: actions.resize });
   return {
-    element: element("div", { class: "immersive", role: "group", "aria-label": "VR" }, button, size),
+    element: element("div", { class: "immersive" }, button, size),
     render(state) {
       const text = translate(state.isPresenting ? "Leave VR" : "Enter VR");
       setText(label, text);

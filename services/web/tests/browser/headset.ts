@@ -87,3 +87,31 @@ export async function waitForGrip(page: Page, side: Side, kind: HandGrip["kind"]
     { side, kind, limb },
   );
 }
+
+/** Show or hide a menu of the system over the stage. */
+export async function showMenu(page: Page, isShown: boolean): Promise<void> {
+  await page.evaluate(
+    (isShown) =>
+      (globalThis as unknown as HeadsetWindow).headset.updateVisibilityState(
+        (isShown ? "visible-blurred" : "visible") as XRVisibilityState,
+      ),
+    isShown,
+  );
+}
+
+/** Take the graphics away from the headset's stage, as browsers do when their graphics process ends. */
+export async function loseGraphics(page: Page): Promise<void> {
+  await page.evaluate(() => {
+    const canvas = document.querySelector<HTMLCanvasElement>("[data-webxr_runtime] canvas");
+    canvas?.getContext("webgl2")?.getExtension("WEBGL_lose_context")?.loseContext();
+  });
+}
+
+/** Wait until an avatar replaces the first puppet in VR. */
+export async function waitForAvatar(page: Page): Promise<void> {
+  await page.waitForFunction(() => {
+    const { immersive } = (globalThis as unknown as HeadsetWindow).bunraku;
+    const group = immersive?.stage.scene.getObjectByName("performers")?.children[0];
+    return group?.visible && !group.getObjectByName("figure");
+  });
+}

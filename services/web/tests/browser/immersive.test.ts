@@ -1,17 +1,21 @@
 /** VR: an emulated headset enters the stage, and its controllers and hands hold strings. */
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
+import { createFigureFile } from "../avatar/figure-files";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { evaluateInEngine } from "./engine-probe";
 import {
   connectHeadset,
   enterVr,
   leaveVr,
+  loseGraphics,
   moveHand,
   pinch,
   ringInRoom,
   setButton,
+  showMenu,
   trackHands,
+  waitForAvatar,
   waitForGrip,
 } from "./headset";
 import {
@@ -43,8 +47,8 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
   }
 
   /** Open a page with a headset, paused where the hands hang down, and enter VR. Errors in its frames fail the test. */
-  async function openInVr(name: string): Promise<Page> {
-    const page = await open(name, { before: connectHeadset });
+  async function openInVr(name: string, before: OpenOptions["before"] = connectHeadset): Promise<Page> {
+    const page = await open(name, { before });
     page.on("console", (message) => {
       if (message.type() === "error") throw new Error(message.text());
     });
@@ -69,10 +73,13 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
   }
 
   test("a controller holds a string, and another viewer sees the limb follow it", async () => {
-    const [page, viewer] = [await openInVr("Aiko"), await open("Mateo")];
     const origin = new URL(fixture.url).origin;
     const requests: string[] = [];
-    page.on("request", (request) => requests.push(request.url()));
+    const page = await openInVr("Aiko", async (page) => {
+      page.on("request", (request) => requests.push(request.url()));
+      await connectHeadset(page);
+    });
+    const viewer = await open("Mateo");
     const trigger = (value: number) => setButton(page, "right", "trigger", value);
     await pull(page, viewer, { side: "right", limb: LEFT_HAND, close: () => trigger(1) });
     await pull(page, viewer, { side: "left", limb: RIGHT_HAND, close: () => setButton(page, "left", "squeeze", 1) });
@@ -86,6 +93,7 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     await waitForWelcome(page);
     await tapKey(page, "Digit2");
     await waitForHold(page, LEFT_HAND);
+    expect(requests.some((url) => url.includes("/assets/session-chunk-"))).toBe(true);
     expect(requests.filter((url) => new URL(url).origin !== origin && !url.startsWith("blob:"))).toEqual([]);
   });
 
@@ -121,6 +129,46 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     await waitForGrip(page, "right", "holding", LEFT_HAND);
     await waitForHold(page, LEFT_HAND);
     await setButton(page, "right", "trigger", 0);
+    await waitForRelease(page, LEFT_HAND);
+  });
+
+  test("strings are let go while a menu of the system is shown, and when the graphics are lost", async () => {
+    // The engine runs in the page, too.
+    const page = await openInVr("Aiko&engine=page");
+    const take = async () => {
+      await moveHand(page, "right", await ringInRoom(page, LEFT_HAND));
+      await setButton(page, "right", "trigger", 1);
+      await waitForHold(page, LEFT_HAND);
+    };
+    await take();
+    await showMenu(page, true);
+    await waitForRelease(page, LEFT_HAND);
+    await showMenu(page, false);
+    await setButton(page, "right", "trigger", 0);
+    await waitForGrip(page, "right", "open", LEFT_HAND);
+    await take();
+    await waitForToast(page, "VR has ended", () => loseGraphics(page));
+    await waitForRelease(page, LEFT_HAND);
+    await setButton(page, "right", "trigger", 0);
+    await enterVr(page);
+    await take();
+  });
+
+  test("an avatar dances in VR, too", async () => {
+    const page = await open("Aiko", { before: connectHeadset });
+    const figure = { name: "mine.glb", mimeType: "model/gltf-binary", buffer: Buffer.from(createFigureFile({})) };
+    await waitForToast(page, "mine dances here", () =>
+      page.locator('input[type="file"]').first().setInputFiles(figure),
+    );
+    // Closes the library.
+    await page.keyboard.press("Escape");
+    await pauseAtStart(page);
+    await enterVr(page);
+    await waitForAvatar(page);
+    await moveHand(page, "right", await ringInRoom(page, LEFT_HAND));
+    await setButton(page, "right", "trigger", 1);
+    await waitForHold(page, LEFT_HAND);
+    await leaveVr(page);
     await waitForRelease(page, LEFT_HAND);
   });
 

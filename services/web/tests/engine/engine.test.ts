@@ -168,3 +168,11 @@ test("a rejected token is reported, and limbs are not offered to viewers", async
   engine.handle({ type: "limb", action: "toggle", limb: 0 });
   expect(eventsOf("limbs").every(({ state }) => !state.isReady)).toBe(true);
 });
+
+test("an immersive session gets no frames without a stage", () => {
+  openSession();
+  engine.handle({ type: "immersive", isPresenting: true });
+  engine.handle({ type: "immersive frame", hands: [] });
+  engine.handle({ type: "immersive", isPresenting: false });
+  expect(eventsOf("immersive frame")).toEqual([]);
+});
