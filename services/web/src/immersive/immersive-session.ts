@@ -58,8 +58,9 @@ export class ImmersiveSession {
   /** Message to be shown at the next frame. */
   #message: string | null = null;
   #requestedAt = -Infinity;
-  #drawnAt = 0;
-  #shownAt = 0;
+  /** Times of the last frame of the headset, and of the engine, in milliseconds. */
+  #drawnAt: number | null = null;
+  #shownAt: number | null = null;
   #isSimple: boolean;
   #isOver = false;
 
@@ -136,7 +137,7 @@ export class ImmersiveSession {
     const space = this.#renderer.xr.getReferenceSpace();
     const pose = space && frame?.getViewerPose(space);
     if (!frame || !space || !pose) return;
-    const interval = (now - this.#drawnAt) / 1000;
+    const interval = (now - (this.#drawnAt ?? now)) / 1000;
     this.#drawnAt = now;
     if (!this.#isSimple && this.#guard.add(interval)) {
       this.#isSimple = true;
@@ -179,7 +180,7 @@ export class ImmersiveSession {
   /** Show the last frame of the engine, if it is a new one. */
   #show(now: number): void {
     if (!this.#frame || this.#frame === this.#shownFrame) return;
-    const seconds = (now - this.#shownAt) / 1000;
+    const seconds = (now - (this.#shownAt ?? now)) / 1000;
     this.stage.apply({ ...this.#frame, figures: this.#figures }, seconds, !this.#isHolding);
     this.#figures = null;
     [this.#shownFrame, this.#shownAt] = [this.#frame, now];

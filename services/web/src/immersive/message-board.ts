@@ -6,11 +6,13 @@ const WIDTH_PX = 1024;
 const HEIGHT_PX = 128;
 const MARGIN_PX = 40;
 const WIDTH_M = 0.72;
-/** Place in front of the viewer's eyes, in metres. */
+/** Place in front of the viewer's eyes and above them, where it covers no performer, in metres. */
 const DISTANCE_M = 1.1;
-const DEPTH_M = 0.42;
+const RISE_M = 0.34;
 /** Time for which a message is shown, in seconds. */
 const DURATION_S = 5;
+/** Longest step of that time: a frame that compiles shaders takes longer. */
+const MAX_STEP_S = 0.1;
 
 export class MessageBoard {
   readonly mesh: Mesh<PlaneGeometry, ShaderMaterial>;
@@ -54,7 +56,7 @@ export class MessageBoard {
     const eyes = new Vector3().setFromMatrixPosition(viewer);
     const ahead = new Vector3().setFromMatrixColumn(viewer, 2).negate().setY(0).normalize();
     this.mesh.position.copy(eyes).addScaledVector(ahead, DISTANCE_M);
-    this.mesh.position.y -= DEPTH_M;
+    this.mesh.position.y += RISE_M;
     this.mesh.quaternion.setFromRotationMatrix(new Matrix4().lookAt(eyes, this.mesh.position, this.mesh.up));
     this.mesh.visible = true;
     this.#remainingS = DURATION_S;
@@ -63,7 +65,7 @@ export class MessageBoard {
 
   /** Advance by `seconds`. */
   update(seconds: number): void {
-    this.#remainingS -= seconds;
+    this.#remainingS -= Math.min(seconds, MAX_STEP_S);
     this.mesh.visible = this.#remainingS > 0;
   }
 

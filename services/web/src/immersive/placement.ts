@@ -18,7 +18,7 @@ const SCALES: Readonly<Record<StageSize, number>> = { "1:1": 1, "1:4": 0.25 };
 /** Distance between the viewer and the centre of the stage, in metres of the room. */
 const DISTANCES_M: Readonly<Record<StageSize, number>> = { "1:1": 1, "1:4": 0.55 };
 /** A small stage is this far below the viewer's eyes, like a table, within these limits, in metres of the room. */
-const TABLE_DEPTH_M = 0.72;
+const TABLE_DEPTH_M = 0.62;
 const TABLE_HEIGHT_M = [0.35, 1.1] as const;
 /** The stage is placed anew for performers who are further away from its centre, in metres of the stage. */
 export const MAX_DISTANCE_M = 1.6;

@@ -85,6 +85,7 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     await pull(page, viewer, { side: "left", limb: RIGHT_HAND, close: () => setButton(page, "left", "squeeze", 1) });
     // The same puppeteer holds both; no second one has come.
     expect(await viewer.locator(".avatars span").count()).toBe(2);
+    expect(await page.evaluate(allowsTracking)).toBe(true);
     await trigger(0);
     await waitForRelease(page, LEFT_HAND);
     await waitForHold(page, RIGHT_HAND);
@@ -220,4 +221,10 @@ function ringOnStage(page: Page, limb: number): Promise<Position> {
 /** Return `a` plus `b` times `scale`. */
 function add(a: Position, b: Position, scale = 1): Position {
   return a.map((value, axis) => value + scale * b[axis]) as Position;
+}
+
+/** Return whether the server's headers allow the page to follow a headset. */
+function allowsTracking(): boolean {
+  const { featurePolicy } = document as unknown as { featurePolicy: { allowsFeature(name: string): boolean } };
+  return featurePolicy.allowsFeature("xr-spatial-tracking");
 }
