@@ -15,8 +15,8 @@ import { PULL_BETA } from "./pointer";
 
 export type Triple = readonly [x: number, y: number, z: number];
 
-/** Name of a hand: that of the body's side, or `none`. */
-export type HandName = XRHandedness;
+/** Name of a hand: that of the body's side, or `none` if it is unknown. */
+export type HandName = "left" | "right" | "none";
 
 /** State of a hand at one instant. */
 export interface HandState {

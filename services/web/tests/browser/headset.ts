@@ -99,12 +99,14 @@ export async function showMenu(page: Page, isShown: boolean): Promise<void> {
   );
 }
 
-/** Take the graphics away from the headset's stage, as browsers do when their graphics process ends. */
-export async function loseGraphics(page: Page): Promise<void> {
-  await page.evaluate(() => {
-    const canvas = document.querySelector<HTMLCanvasElement>("[data-webxr_runtime] canvas");
-    canvas?.getContext("webgl2")?.getExtension("WEBGL_lose_context")?.loseContext();
-  });
+/**
+ * Report the loss of the graphics to the headset's stage, as browsers do when their graphics process ends. They are not
+ * taken away: the emulator reads them in a frame that may come before the report.
+ */
+export async function reportGraphicsLoss(page: Page): Promise<void> {
+  await page.evaluate(() =>
+    document.querySelector("[data-webxr_runtime] canvas")?.dispatchEvent(new Event("webglcontextlost")),
+  );
 }
 
 /** Wait until an avatar replaces the first puppet in VR. */

@@ -8,9 +8,9 @@ import {
   connectHeadset,
   enterVr,
   leaveVr,
-  loseGraphics,
   moveHand,
   pinch,
+  reportGraphicsLoss,
   ringInRoom,
   setButton,
   showMenu,
@@ -57,6 +57,13 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     return page;
   }
 
+  /** Open the page of another viewer, which leaves the processor to the headset. */
+  async function openViewer(): Promise<Page> {
+    const page = await open("Mateo");
+    await stopDrawing(page);
+    return page;
+  }
+
   /** Close a hand on a ring by `close`, move it, and expect that `viewer` sees the same movement of the ring. */
   async function pull(page: Page, viewer: Page, { side, limb, scale = 1, close }: PullOptions): Promise<void> {
     const before = await ringOnStage(viewer, limb);
@@ -79,7 +86,7 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
       page.on("request", (request) => requests.push(request.url()));
       await connectHeadset(page);
     });
-    const viewer = await open("Mateo");
+    const viewer = await openViewer();
     const trigger = (value: number) => setButton(page, "right", "trigger", value);
     await pull(page, viewer, { side: "right", limb: LEFT_HAND, close: () => trigger(1) });
     await pull(page, viewer, { side: "left", limb: RIGHT_HAND, close: () => setButton(page, "left", "squeeze", 1) });
@@ -99,7 +106,7 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
   });
 
   test("a tracked hand holds a string by a pinch, also of a stage at a quarter of its size", async () => {
-    const [page, viewer] = [await openInVr("Aiko"), await open("Mateo")];
+    const [page, viewer] = [await openInVr("Aiko"), await openViewer()];
     await trackHands(page);
     await page.evaluate(() => document.querySelector<HTMLElement>(".immersive-size")?.click());
     await expect.poll(async () => (await ringInRoom(page, LEFT_HAND))[1]).toBeGreaterThan(0.9);
@@ -148,7 +155,7 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     await setButton(page, "right", "trigger", 0);
     await waitForGrip(page, "right", "open", LEFT_HAND);
     await take();
-    await waitForToast(page, "VR has ended", () => loseGraphics(page));
+    await waitForToast(page, "VR has ended", () => reportGraphicsLoss(page));
     await waitForRelease(page, LEFT_HAND);
     await setButton(page, "right", "trigger", 0);
     await enterVr(page);
