@@ -13,7 +13,6 @@ import { createTheme, type ThemeChoice } from "../ui/theme";
 import { AvatarSlots } from "./avatar-slot";
 import { EngineConnection } from "./engine-connection";
 import { Exporter } from "./exporter";
-import { ImmersiveOffer } from "./immersive-offer";
 import { Invitation } from "./invitation";
 import { LibraryController } from "./library-controller";
 import { LimbControls } from "./limb-controls";
@@ -76,14 +75,7 @@ export class App implements AppParts {
       limbs: this.limbs,
       getPlayback: () => this.playback,
       invitation: new Invitation(page.nameTags),
-      immersive: new ImmersiveOffer({
-        page,
-        send,
-        getTheme: () => this.theme.theme,
-        prefersReducedMotion: () => reducedMotion.matches,
-        getAvatarFiles: () => this.avatarSlots.activeFiles,
-        onPresenting: () => this.stageHost.updateHidden(),
-      }),
+      getAvatarFiles: () => this.avatarSlots.activeFiles,
       viewOnly: !pageAccess.allows("control"),
       isAlone: view !== null,
       getMapping: () => this.#mapping,

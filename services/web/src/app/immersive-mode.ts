@@ -1,23 +1,20 @@
 /** VR on the page: its controls, its session, and the messages between it and the engine. */
 import type { ClaimState } from "../engine/claim-controller";
-import type { EngineCommand, ImmersiveFrame } from "../engine/message";
+import type { EngineCommand, EngineEvent } from "../engine/message";
 import { type PlainMessageKey, translate } from "../i18n/translator";
 import type { ImmersiveSession } from "../immersive/immersive-session";
 import type { StageSize } from "../immersive/placement";
-import type { Theme } from "../stage/scenery/look";
 import { createImmersiveControls, type ImmersiveControls } from "../ui/immersive-controls";
 import { limbName, performerCount } from "../ui/limb-state";
 import type { ShowToast } from "../ui/notification/toast";
 
+/** Parts of the page that VR uses. */
 export interface ImmersiveHost {
-  readonly page: { readonly toast: ShowToast; readonly header: { addControls(controls: HTMLElement): void } };
-  send(command: EngineCommand): void;
-  getTheme(): Theme;
-  prefersReducedMotion(): boolean;
+  readonly page: { readonly toast: ShowToast };
+  readonly engine: { post(command: EngineCommand): void };
+  readonly reducedMotion: { readonly matches: boolean };
   /** Return the files of the avatars that replace puppets, by performer. */
   getAvatarFiles(): readonly (File | null)[];
-  /** Called when VR has begun to show the stage, and when it has ended. */
-  onPresenting(): void;
 }
 
 export class ImmersiveMode {
@@ -30,40 +27,38 @@ export class ImmersiveMode {
   #requested: ReadonlySet<number> = new Set();
 
   constructor(private readonly host: ImmersiveHost) {
-    this.#controls = createImmersiveControls({
+    this.#controls = createImmersiveControls(document, {
       toggle: () => void (this.#session ? this.#session.end().catch(() => undefined) : this.#enter()),
       resize: () => this.#setSize(this.#size === "1:1" ? "1:4" : "1:1"),
     });
-    host.page.header.addControls(this.#controls.element);
     this.#render();
+    // After the page has told the engine that nobody sees it.
+    document.addEventListener("visibilitychange", () => this.#reportVisibility());
+    const update = async () => this.#setOffered((await navigator.xr?.isSessionSupported("immersive-vr")) ?? false);
+    navigator.xr?.addEventListener("devicechange", () => void update().catch(() => this.#setOffered(false)));
   }
 
-  get isPresenting(): boolean {
-    return this.#view !== null;
+  /** Handle an event of the engine, after the page. */
+  onEvent(event: EngineEvent): void {
+    if (event.type === "immersive") this.#view?.onFrame(event.frame);
+    else if (event.type === "toast") this.#view?.showMessage(event.message);
+    else if (event.type === "limbs") this.#showRequests(event.state);
   }
 
-  /** Show the controls, or hide them as no headset is there any more. */
-  setOffered(isOffered: boolean): void {
-    this.#controls.element.hidden = !isOffered && !this.#session;
-  }
-
-  onFrame(frame: ImmersiveFrame): void {
-    this.#view?.onFrame(frame);
-  }
-
-  showMessage(text: string): void {
-    this.#view?.showMessage(text);
+  /** Hide the controls while no headset is connected. */
+  #setOffered(isOffered: boolean): void {
+    this.#controls.isShown = isOffered || this.#session !== null;
   }
 
   /** Tell the viewer who asks for a limb that the viewer holds. */
-  onLimbs({ limbs }: ClaimState): void {
+  #showRequests({ limbs }: ClaimState): void {
     const requested = limbs.flatMap(({ holder, requesters }, limb) =>
       holder?.mine && requesters.length > 0 ? limb : [],
     );
     for (const limb of requested) {
       if (this.#requested.has(limb)) continue;
       const names = { name: limbs[limb].requesters[0].name, limb: limbName(limb, performerCount(limbs)) };
-      this.showMessage(translate("{name} asks for the {limb}", names));
+      this.#view?.showMessage(translate("{name} asks for the {limb}", names));
     }
     this.#requested = new Set(requested);
   }
@@ -103,23 +98,22 @@ export class ImmersiveMode {
     const { host } = this;
     try {
       this.#view = new ImmersiveSession(session, {
-        theme: host.getTheme(),
+        theme: document.documentElement.dataset["theme"] === "day" ? "day" : "night",
         size: this.#size,
-        reducedMotion: host.prefersReducedMotion(),
+        reducedMotion: host.reducedMotion.matches,
         avatarFiles: host.getAvatarFiles(),
-        requestFrame: (hands) => host.send({ type: "immersive frame", hands }),
-        selectNextPerformer: () => host.send({ type: "performer", performer: "next" }),
+        requestFrame: (hands) => host.engine.post({ type: "immersive", hands }),
+        selectNextPerformer: () => host.engine.post({ type: "performer", performer: "next" }),
         onSize: (size) => this.#showSize(size),
         onGraphicsLost: () => host.page.toast(translate(GRAPHICS_LOST)),
       });
       this.#exposeDebugHandle();
-      host.send({ type: "immersive", isPresenting: true });
-      host.onPresenting();
+      this.#reportVisibility();
       await this.#view.start();
     } catch (error) {
       this.#fail(REFUSED, error);
     }
-    this.showMessage(translate("Close a hand on a ring to hold its string: trigger, squeeze or pinch"));
+    this.#view.showMessage(translate("Close a hand on a ring to hold its string: trigger, squeeze or pinch"));
   }
 
   /** End the session, and throw the reason for the user. */
@@ -133,10 +127,15 @@ export class ImmersiveMode {
     if (this.#view) {
       this.#view = null;
       this.#exposeDebugHandle();
-      this.host.send({ type: "immersive", isPresenting: false });
-      this.host.onPresenting();
+      this.host.engine.post({ type: "immersive", hands: null });
+      this.#reportVisibility();
     }
     this.#render();
+  }
+
+  /** Tell the engine whether anybody sees the stage: in VR, or on the page. */
+  #reportVisibility(): void {
+    this.host.engine.post({ type: "set", settings: { isHidden: document.hidden && !this.#view } });
   }
 
   /** Add the session to `window.bunraku`, where tests and developers find the parts of the page. */

@@ -17,7 +17,8 @@ import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
 import { type EngineConnection, EngineError } from "./engine-connection";
 import { GamepadPolling } from "./gamepad-polling";
-import type { ImmersiveOffer } from "./immersive-offer";
+import type { ImmersiveMode } from "./immersive-mode";
+import { watchForHeadset } from "./immersive-offer";
 import type { Invitation } from "./invitation";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
@@ -42,19 +43,22 @@ export interface StageHostOptions {
   engine: EngineConnection;
   limbs: LimbControls;
   invitation: Invitation;
-  immersive: ImmersiveOffer;
   /** True if this page may not claim limbs. */
   viewOnly: boolean;
   /** True if the stage is shown without the page around it, and without inputs. */
   isAlone: boolean;
   getPlayback(): Pick<PlaybackController, "current" | "onChange" | "onTime" | "onUnauthorized">;
   getMapping(): Mapping;
+  /** Return the files of the avatars that replace puppets, by performer. */
+  getAvatarFiles(): readonly (File | null)[];
 }
 
 export class StageHost {
   readonly #overlay: StageOverlay;
   readonly #gamepad: GamepadPolling;
   #isReady = false;
+  /** VR; null while it is not loaded. */
+  #immersive: ImmersiveMode | null = null;
 
   constructor(private readonly options: StageHostOptions) {
     const { canvas, page, limbs, getMapping } = options;
@@ -79,19 +83,14 @@ export class StageHost {
     addEventListener("resize", () => this.resize());
     if (!this.options.isAlone) {
       this.#listenToInputs();
-      this.options.startup.runWhenFinished(() => this.options.immersive.watch());
+      this.options.startup.runWhenFinished(() => watchForHeadset(() => void this.#loadImmersive()));
     }
     // A page in the background draws no frames, so nothing would release the inputs that were pressed.
     document.addEventListener("visibilitychange", () => {
-      this.updateHidden();
+      this.#setSettings({ isHidden: document.hidden });
       if (document.hidden) this.options.limbs.commands.releaseAll();
     });
     await engine.start(await worker);
-  }
-
-  /** Tell the engine whether anybody sees the stage: on the page, or in VR. */
-  updateHidden(): void {
-    this.#setSettings({ isHidden: document.hidden && !this.options.immersive.isPresenting });
   }
 
   setTheme(theme: Theme): void {
@@ -167,7 +166,7 @@ export class StageHost {
 
   /** Handle an event of the engine. */
   onEvent(event: EngineEvent): void {
-    const { immersive, invitation, limbs, page, startup, viewOnly } = this.options;
+    const { invitation, limbs, page, startup, viewOnly } = this.options;
     const playback = this.options.getPlayback();
     switch (event.type) {
       case "ready":
@@ -210,7 +209,6 @@ export class StageHost {
         const { ask } = event;
         if (ask) page.toast(event.message, { label: ask.label, key: ask.key, run: () => limbs.act("ask", ask.limb) });
         else page.toast(event.message);
-        immersive.showMessage(event.message);
         break;
       }
       case "limb notice":
@@ -225,13 +223,17 @@ export class StageHost {
       case "unauthorized":
         playback.onUnauthorized(event);
         break;
-      case "immersive frame":
-        immersive.onFrame(event.frame);
-        break;
       case "graphics":
         this.#showContextLoss(event.isLost);
         break;
     }
+    this.#immersive?.onEvent(event);
+  }
+
+  /** Load VR once. Without a connection it stays absent: the next headset tries again. */
+  async #loadImmersive(): Promise<void> {
+    const chunk = await import("./immersive-mode").catch(() => null);
+    if (chunk) this.#immersive ??= new chunk.ImmersiveMode(this.options);
   }
 
   #setSettings(settings: Partial<EngineSettings>): void {
@@ -247,7 +249,6 @@ export class StageHost {
     page.strings.render(limbs, isReady, performer);
     page.limbRequests.render(limbs, giveKey);
     page.library.danceAs.dancers(limbs, performer);
-    this.options.immersive.onLimbs(state);
   }
 
   #listenToInputs(): void {

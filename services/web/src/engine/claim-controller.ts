@@ -137,16 +137,6 @@ export class ClaimController {
     return !this.viewOnly && state !== undefined && !state.holder;
   }
 
-  isHeldByOther(limb: number): boolean {
-    const holder = this.limbStates()[limb]?.holder;
-    return holder ? !holder.mine : false;
-  }
-
-  /** True while this page asks for a limb. */
-  isAsking(limb: number): boolean {
-    return this.#playback?.puppeteer.isAsking(limb) ?? false;
-  }
-
   render(): void {
     const { hands, velocity } = this.stageInputs ?? {};
     this.view.render({

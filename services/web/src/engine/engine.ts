@@ -14,6 +14,7 @@ import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
 import { AvatarModels } from "./avatar-models";
 import { changedParts } from "./changed-parts";
 import { ClaimController } from "./claim-controller";
+import type { ImmersiveController } from "./immersive-controller";
 import type {
   EngineCommand,
   EngineEvent,
@@ -60,6 +61,7 @@ export class Engine {
   #isClosed = false;
   /** True while an immersive session shows the stage: it requests the frames. */
   #isImmersive = false;
+  #immersive: ImmersiveController | null = null;
   #lastState: StageState | null = null;
   #lastPosition = NaN;
 
@@ -191,11 +193,7 @@ export class Engine {
         this.#setLead(command.lead);
         break;
       case "immersive":
-        this.#isImmersive = command.isPresenting;
-        this.#controller?.setImmersive(command.isPresenting);
-        break;
-      case "immersive frame":
-        this.#sendImmersiveFrame(command.hands);
+        void this.#onImmersive(command.hands);
         break;
       case "request":
         void this.#respond(command.id, command.request);
@@ -210,7 +208,6 @@ export class Engine {
     canvas.addEventListener("webglcontextrestored", () => this.send({ type: "graphics", isLost: false }));
     this.#avatars.stage = controller.stage;
     this.#applySettings(this.#settings);
-    if (this.#isImmersive) controller.setImmersive(true);
     controller.setPlayback(this.#playback);
     this.#exposeDebugHandle();
   }
@@ -289,13 +286,15 @@ export class Engine {
     this.#playback?.viewer.recordFrame(performance.now() - now);
   }
 
-  /** Send the next frame of an immersive session, which has nothing to show without a stage. */
-  #sendImmersiveFrame(hands: readonly HandState[]): void {
-    const controller = this.#controller;
-    if (!controller || !this.#isImmersive) return;
-    const now = performance.now();
-    this.send({ type: "immersive frame", frame: controller.advanceImmersive(now, hands) });
-    this.#playback?.viewer.recordFrame(performance.now() - now);
+  /** Send the next frame of an immersive session with these hands; null ends it. */
+  async #onImmersive(hands: readonly HandState[] | null): Promise<void> {
+    this.#isImmersive = hands !== null;
+    // The session asks again for a frame that was not sent.
+    const chunk = await import("./immersive-controller").catch(() => null);
+    if (!chunk || !this.#controller) return;
+    this.#immersive ??= new chunk.ImmersiveController(this.#controller, this.#claims, this.#settings);
+    const frame = this.#immersive.advance(performance.now(), hands);
+    if (frame) this.send({ type: "immersive", frame });
   }
 
   /** Send what has changed since the last frame. */

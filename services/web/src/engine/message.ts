@@ -108,10 +108,8 @@ export type EngineCommand =
   /** Stage time that the sound presents at the time `at`; null without sound. */
   | { type: "lead"; lead: (LeaderTime & { readonly at: number }) | null }
   | { type: "request"; id: number; request: EngineRequest }
-  /** Begin or end an immersive session: the canvas is not drawn meanwhile. */
-  | { type: "immersive"; isPresenting: boolean }
-  /** Apply the hands of the immersive session, and send its next frame. */
-  | { type: "immersive frame"; hands: readonly HandState[] };
+  /** Apply the hands of an immersive session, and send its next frame in place of drawing; null ends the session. */
+  | { type: "immersive"; hands: readonly HandState[] | null };
 
 /** Requests, each answered by one response. */
 export type EngineRequest =
@@ -230,5 +228,5 @@ export type EngineEvent =
   | { type: "limb notice"; text: string }
   /** A control was pressed or repeated that moves the selected limb, and there is none: the page runs the action. */
   | { type: "page action"; action: PageAction }
-  | { type: "immersive frame"; frame: ImmersiveFrame }
+  | { type: "immersive"; frame: ImmersiveFrame }
   | { type: "response"; id: number; result?: unknown; failure?: EngineFailure };

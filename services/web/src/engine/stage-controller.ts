@@ -3,7 +3,6 @@
  * in a worker or in the page.
  */
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
-import { HandInput, type HandState } from "../input/hand";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
 import { createPointerInput, type PointerInput } from "../input/pointer";
@@ -17,7 +16,6 @@ import type { StringState } from "../stage/strings/strings";
 import type { LimbState } from "../ui/limb-state";
 import { performerOfLimb } from "../wire/limbs";
 import type { ClaimController } from "./claim-controller";
-import type { ImmersiveFrame } from "./message";
 import type { Playback } from "./playback";
 
 export interface StageControllerOptions {
@@ -47,10 +45,11 @@ export interface FrameState {
 }
 
 /** What the stage shows at one instant. */
-interface StageContent {
+export interface StageContent {
   poses: readonly (Pose | null)[];
   limbs: readonly LimbState[];
   strings: readonly StringState[];
+  lights: readonly LightState[];
   /** Seconds since the last one. */
   seconds: number;
 }
@@ -59,17 +58,14 @@ export class StageController {
   readonly stage: Stage;
   readonly hands: LimbController;
   readonly pointer: PointerInput;
-  /** Hands of an immersive session. */
-  readonly handInput: HandInput;
   readonly velocity: VelocityInputs;
   readonly commands: CommandDispatcher;
   readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
   #lastDrawMs = 0;
-  /** Figures of the performers, new ones with each change. */
-  #figures: readonly Figure[] = [];
-  /** Figures that the immersive session was told of; null before its first frame. */
-  #immersiveFigures: readonly Figure[] | null = null;
+  /** Figures of the performers, other ones after each change, and the turn to the front of the first. */
+  figures: readonly Figure[] = [];
+  front = 0;
   /** Last selected performer, and the time in milliseconds until which its rings are highlighted. */
   #ringHighlight = { performer: 0, until: 0 };
 
@@ -107,16 +103,6 @@ export class StageController {
       smoothing: () => getMapping().pointerSmoothing,
       depthInput: (limb) => this.velocity.depthInput(limb),
     });
-    this.handInput = new HandInput(this.stage, this.hands, {
-      selectedPerformer: () => selection.performer,
-      isFree,
-      isHeldByOther: (limb) => limbController.isHeldByOther(limb),
-      onClaimed: (limb) => selection.select(performerOfLimb(limb)),
-      ask: (limb) => limbController.requestLimb(limb),
-      isAsking: (limb) => limbController.isAsking(limb),
-      withdraw: (limb) => limbController.withdrawRequest(limb),
-      smoothing: () => getMapping().pointerSmoothing,
-    });
     this.commands = new CommandDispatcher(this.hands, this.velocity, actions);
     limbController.stageInputs = {
       hands: this.hands,
@@ -139,11 +125,12 @@ export class StageController {
 
   /** Show the performers of the playback, as far as their skeletons were received. */
   updatePerformers(): void {
-    const { performers = [], figure, front } = this.#playback?.viewer ?? {};
+    const { performers = [], figure, front = 0 } = this.#playback?.viewer ?? {};
     if (!figure) return;
     // A performer whose track cannot be decoded keeps its index, and is never drawn.
-    this.#figures = performers.map((performer) => performer?.figure ?? figure);
-    this.stage.setFigures(this.#figures, front);
+    this.figures = performers.map((performer) => performer?.figure ?? figure);
+    this.front = front;
+    this.stage.setFigures(this.figures, front);
   }
 
   /** Draw the frame of local time `now` in milliseconds. `focusedLimb` is the limb whose control has the focus. */
@@ -151,47 +138,20 @@ export class StageController {
     const { limbController, pointer, stage } = this;
     const viewer = this.#playback?.viewer;
     pointer.update(now);
-    const { poses, limbs, strings, seconds } = this.#advance(now, focusedLimb);
+    const { poses, limbs, strings, lights, seconds } = this.advance(now, [focusedLimb]);
     // The camera must not move under a finger that drags a limb.
     if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : this.selectedPerformer;
     const camera = this.#camera ?? viewer?.cameraAt(now);
-    stage.draw(poses, strings, seconds, camera, this.#lightsAt(now), viewer?.presentationTime(now));
+    stage.draw(poses, strings, seconds, camera, lights, viewer?.presentationTime(now));
     return { pose: poses[0] ?? null, limbs };
   }
 
-  /** Begin or end an immersive session, which shows the stage in place of the canvas. */
-  setImmersive(isPresenting: boolean): void {
-    this.stage.isPaused = isPresenting;
-    this.#immersiveFigures = null;
-    if (!isPresenting) this.handInput.releaseAll();
-  }
-
-  /** Apply the hands of an immersive session at local time `now` in milliseconds, and return what it shows then. */
-  advanceImmersive(now: number, hands: readonly HandState[]): ImmersiveFrame {
-    const viewer = this.#playback?.viewer;
-    const grips = this.limbController.viewOnly ? [] : this.handInput.update(hands, now);
-    const { poses, strings, seconds } = this.#advance(now, null);
-    this.stage.draw(poses, strings, seconds);
-    const figures = this.#figures === this.#immersiveFigures ? null : this.#figures;
-    this.#immersiveFigures = this.#figures;
-    return {
-      figures,
-      front: viewer?.front ?? 0,
-      poses,
-      strings: strings.map((string) => ({ ...string, pullTarget: string.pullTarget?.toArray() ?? null })),
-      lights: this.#lightsAt(now),
-      performer: this.selectedPerformer,
-      grips,
-    };
-  }
-
-  #lightsAt(now: number): readonly LightState[] {
-    return this.#playback?.viewer.lightsAt(now) ?? [];
-  }
-
-  /** Advance limbs that move by velocity, and return the content of the stage at local time `now` in milliseconds. */
-  #advance(now: number, focusedLimb: number | null): StageContent {
-    const { handInput, hands, limbController, pointer, velocity } = this;
+  /**
+   * Advance limbs that move by velocity, and return the content of the stage at local time `now` in milliseconds.
+   * `highlightedLimbs` are highlighted in addition to those of pointer and selection.
+   */
+  advance(now: number, highlightedLimbs: readonly (number | null)[] = []): StageContent {
+    const { hands, limbController, pointer, velocity } = this;
     const viewer = this.#playback?.viewer;
     const seconds = (now - this.#lastDrawMs) / 1000;
     this.#lastDrawMs = now;
@@ -204,22 +164,20 @@ export class StageController {
         performer: selection.performer,
         until: selection.count > 1 ? now + RING_HIGHLIGHT_MS : 0,
       };
-    const { limbsInReach } = handInput;
     const strings = limbs.map(({ holder, selected }, limb): StringState => {
       const isSelected = performerOfLimb(limb) === selection.performer;
       return {
         puppeteer: holder?.colour ?? null,
         isHighlighted:
           pointer.hoveredLimb === limb ||
-          focusedLimb === limb ||
+          highlightedLimbs.includes(limb) ||
           selected ||
-          limbsInReach.includes(limb) ||
           (isSelected && now < this.#ringHighlight.until),
         pullTarget: hands.pullTarget(limb),
         isDimmed: !isSelected,
       };
     });
-    return { poses, limbs, strings, seconds };
+    return { poses, limbs, strings, lights: viewer?.lightsAt(now) ?? [], seconds };
   }
 
   /**

@@ -51,8 +51,6 @@ export class Stage {
   /** Recorded path of the audience's camera. */
   readonly cameraRecorder = new CameraRecorder();
   readonly renderer: WebGLRenderer;
-  /** Pauses drawing, while the performers are shown elsewhere: they go on moving. */
-  isPaused = false;
   /** Performer that this page's inputs act on, which a narrow picture frames; null frames all. */
   selectedPerformer: number | null = null;
   readonly #performerGroup: PerformerGroup;
@@ -222,7 +220,6 @@ export class Stage {
     const { audience, rig } = this;
     const seconds = Math.min(interval, MAX_STEP_S);
     this.#performerGroup.apply(poses, this.#reducedMotion ? 0 : seconds);
-    if (this.isPaused) return;
     const { visiblePerformers } = this.#performerGroup;
     const hasPose = poses.some((pose) => pose !== null) && visiblePerformers.length > 0;
     if (hasPose) {

@@ -18,8 +18,6 @@ export interface Header {
   setMotionName(name: string): void;
   renderPeople(presence: Presence | null, self: string | null): void;
   setTheme(theme: Theme): void;
-  /** Add controls that only some browsers have, before the other buttons. */
-  addControls(controls: HTMLElement): void;
   /** Elements of the header that cover the picture. */
   readonly parts: readonly HTMLElement[];
 }
@@ -79,7 +77,6 @@ export function createHeader(
   root.append(element("header", { class: "header" }, brand, right));
   return {
     parts: [brand, right],
-    addControls: (controls) => keys.before(controls),
     setMotionName(name) {
       setText(motionName, name);
       document.title = name ? `${isolateBidi(name)} - Bunraku` : "Bunraku";

@@ -1,20 +1,5 @@
-import { afterEach, expect, test, vi } from "vitest";
-import type { ImmersiveHost } from "../../src/app/immersive-mode";
-import { ImmersiveOffer } from "../../src/app/immersive-offer";
-
-/** States in which the mode was told to be offered; empty while it is not loaded. */
-let offered: boolean[] = [];
-
-vi.mock("../../src/app/immersive-mode", () => ({
-  ImmersiveMode: class {
-    isPresenting = true;
-    setOffered(isOffered: boolean): void {
-      offered.push(isOffered);
-    }
-  },
-}));
-
-afterEach(() => void (offered = []));
+import { expect, test, vi } from "vitest";
+import { watchForHeadset } from "../../src/app/immersive-offer";
 
 /** A system for VR whose headset can be connected. */
 class System extends EventTarget {
@@ -26,34 +11,32 @@ class System extends EventTarget {
   }
 }
 
-const watch = (system: System | undefined) => {
-  const offer = new ImmersiveOffer({} as ImmersiveHost, system as unknown as XRSystem);
-  offer.watch();
-  return offer;
-};
+function watch(system?: System) {
+  const load = vi.fn();
+  watchForHeadset(load, system as unknown as XRSystem);
+  return load;
+}
 
-test("a browser without WebXR is offered nothing", async () => {
-  const offer = watch(undefined);
+test("a browser without WebXR loads nothing", async () => {
+  const load = watch();
   await Promise.resolve();
-  expect([offered, offer.isPresenting]).toEqual([[], false]);
+  expect(load).not.toHaveBeenCalled();
 });
 
-test("controls are shown once a headset is connected, and hidden without it", async () => {
+test("VR is loaded once a headset is connected", async () => {
   const system = new System();
-  const offer = watch(system);
+  const load = watch(system);
   await vi.waitFor(() => expect(system.isSessionSupported).toHaveBeenCalledWith("immersive-vr"));
-  expect(offered).toEqual([]);
+  expect(load).not.toHaveBeenCalled();
   system.connect(true);
-  await vi.waitFor(() => expect(offered).toEqual([true]));
-  expect(offer.isPresenting).toBe(true);
-  system.connect(false);
-  await vi.waitFor(() => expect(offered).toEqual([true, false]));
+  await vi.waitFor(() => expect(load).toHaveBeenCalledTimes(1));
 });
 
 test("a browser that refuses to answer has no VR", async () => {
   const system = new System();
   system.isSessionSupported.mockRejectedValue(new DOMException("", "SecurityError"));
-  watch(system);
+  const load = watch(system);
   await vi.waitFor(() => expect(system.isSessionSupported).toHaveBeenCalled());
-  expect(offered).toEqual([]);
+  await Promise.resolve();
+  expect(load).not.toHaveBeenCalled();
 });

@@ -169,10 +169,11 @@ test("a rejected token is reported, and limbs are not offered to viewers", async
   expect(eventsOf("limbs").every(({ state }) => !state.isReady)).toBe(true);
 });
 
-test("an immersive session gets no frames without a stage", () => {
+test("an immersive session gets no frames without a stage", async () => {
   openSession();
-  engine.handle({ type: "immersive", isPresenting: true });
-  engine.handle({ type: "immersive frame", hands: [] });
-  engine.handle({ type: "immersive", isPresenting: false });
-  expect(eventsOf("immersive frame")).toEqual([]);
+  engine.handle({ type: "immersive", hands: [] });
+  engine.handle({ type: "immersive", hands: null });
+  await import("../../src/engine/immersive-controller");
+  await Promise.resolve();
+  expect(eventsOf("immersive")).toEqual([]);
 });
