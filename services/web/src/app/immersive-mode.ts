@@ -102,7 +102,10 @@ export class ImmersiveMode {
         size: this.#size,
         reducedMotion: host.reducedMotion.matches,
         avatarFiles: host.getAvatarFiles(),
-        requestFrame: (hands) => host.engine.post({ type: "immersive", hands }),
+        requestFrame: (hands) => {
+          // A frame after the end would begin another session in the engine.
+          if (this.#session === session) host.engine.post({ type: "immersive", hands });
+        },
         selectNextPerformer: () => host.engine.post({ type: "performer", performer: "next" }),
         onSize: (size) => this.#showSize(size),
         onGraphicsLost: () => host.page.toast(translate(GRAPHICS_LOST)),

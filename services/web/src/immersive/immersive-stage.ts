@@ -94,7 +94,7 @@ export class ImmersiveStage {
     this.#lights.applyLook(look);
     this.#rig.group.add(this.#lights.group);
     this.room.add(this.camera);
-    this.room.matrixAutoUpdate = false;
+    for (const object of [this.room, this.camera]) object.matrixAutoUpdate = false;
     this.scene.add(
       this.#rig.group,
       this.#hall,

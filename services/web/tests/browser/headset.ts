@@ -69,6 +69,15 @@ export async function setButton(page: Page, side: Side, button: string, value: n
   );
 }
 
+/** Push the thumbstick of a controller to the left (-1) or right (1). */
+export async function turnThumbstick(page: Page, side: Side, x: number): Promise<void> {
+  await page.evaluate(
+    ({ side, x }) =>
+      (globalThis as unknown as HeadsetWindow).headset.controllers[side]?.updateAxis("thumbstick", "x-axis", x),
+    { side, x },
+  );
+}
+
 /** Pinch with a tracked hand, 0 (open) to 1. */
 export async function pinch(page: Page, side: Side, value: number): Promise<void> {
   await page.evaluate(

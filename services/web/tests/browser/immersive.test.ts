@@ -15,6 +15,7 @@ import {
   setButton,
   showMenu,
   trackHands,
+  turnThumbstick,
   waitForAvatar,
   waitForGrip,
 } from "./headset";
@@ -138,6 +139,32 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     await waitForHold(page, LEFT_HAND);
     await setButton(page, "right", "trigger", 0);
     await waitForRelease(page, LEFT_HAND);
+  });
+
+  test("the next of several performers comes before the viewer, and the view turns", async () => {
+    const page = await openInVr("Aiko");
+    const { motion } = fixture;
+    const { id } = await fixture.request<{ id: string }>("POST", `/v1/motions/${motion}/performers`, {
+      motions: [motion],
+    });
+    await fixture.request("PATCH", `/v1/sessions/${fixture.session}`, { motion: id, position: 0 });
+    const sideOf = async (performer: number) => {
+      const [left, right] = await Promise.all([0, 1].map((hand) => ringInRoom(page, 4 * performer + hand)));
+      return left && right ? (left[0] + right[0]) / 2 : null;
+    };
+    await expect.poll(() => sideOf(1)).not.toBe(null);
+    await expect.poll(() => sideOf(0)).toBeCloseTo(0, 1);
+    expect(Math.abs((await sideOf(1)) ?? 0)).toBeGreaterThan(0.5);
+    await setButton(page, "left", "x-button", 1);
+    await expect.poll(() => sideOf(1)).toBeCloseTo(0, 1);
+    await moveHand(page, "right", await ringInRoom(page, 4 + RIGHT_HAND));
+    await setButton(page, "right", "trigger", 1);
+    await waitForHold(page, 4 + RIGHT_HAND);
+    await setButton(page, "right", "trigger", 0);
+    await waitForRelease(page, 4 + RIGHT_HAND);
+    const [before] = await ringInRoom(page, 4);
+    await turnThumbstick(page, "right", 1);
+    await expect.poll(async () => (await ringInRoom(page, 4))[0]).toBeLessThan(before - 0.3);
   });
 
   test("strings are let go while a menu of the system is shown, and when the graphics are lost", async () => {
