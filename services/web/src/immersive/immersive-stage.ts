@@ -68,7 +68,7 @@ export class ImmersiveStage {
 
   /** `renderer` does not present a session yet: textures are drawn with it first. */
   constructor(
-    private readonly renderer: WebGLRenderer,
+    readonly renderer: WebGLRenderer,
     private readonly options: ImmersiveStageOptions,
   ) {
     const { theme, size, isSimple, reducedMotion } = options;

@@ -2,6 +2,7 @@
 import { fileURLToPath } from "node:url";
 import type { XRDevice } from "iwer";
 import type { Page } from "playwright-core";
+import type { Material, Mesh } from "three";
 import type { ImmersiveSession } from "../../src/immersive/immersive-session";
 import type { HandGrip } from "../../src/input/hand";
 import type { Position } from "./page-probe";
@@ -124,5 +125,28 @@ export async function waitForAvatar(page: Page): Promise<void> {
     const { immersive } = (globalThis as unknown as HeadsetWindow).bunraku;
     const group = immersive?.stage.scene.getObjectByName("performers")?.children[0];
     return group?.visible && !group.getObjectByName("figure");
+  });
+}
+
+/** Let the page's thread, before its scripts, believe that a graphics processor draws. */
+export async function pretendGraphicsProcessor(page: Page): Promise<void> {
+  await page.addInitScript(() => {
+    const UNMASKED_RENDERER_WEBGL = 0x9246;
+    const { getParameter } = WebGL2RenderingContext.prototype;
+    WebGL2RenderingContext.prototype.getParameter = function (name: number): unknown {
+      return name === UNMASKED_RENDERER_WEBGL ? "A graphics processor" : getParameter.call(this, name);
+    };
+  });
+}
+
+/** Return the material of the first puppet in VR, and the number of invalid shader programs. */
+export function readMaterial(page: Page): Promise<{ type: string; invalidPrograms: number }> {
+  return page.evaluate(() => {
+    const { stage } = (globalThis as unknown as HeadsetWindow).bunraku.immersive as ImmersiveSession;
+    const figure = stage.scene.getObjectByName("figure") as Mesh;
+    const gl = stage.renderer.getContext();
+    const programs = (stage.renderer.info.programs ?? []).map(({ program }) => program as WebGLProgram);
+    const invalid = programs.filter((program) => !gl.getProgramParameter(program, gl.LINK_STATUS));
+    return { type: (figure.material as Material).type, invalidPrograms: invalid.length };
   });
 }

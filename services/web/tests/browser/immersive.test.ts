@@ -10,6 +10,8 @@ import {
   leaveVr,
   moveHand,
   pinch,
+  pretendGraphicsProcessor,
+  readMaterial,
   reportGraphicsLoss,
   ringInRoom,
   setButton,
@@ -187,6 +189,22 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
     await setButton(page, "right", "trigger", 0);
     await enterVr(page);
     await take();
+  });
+
+  test("a headset that draws too slowly gets a simpler puppet", async () => {
+    const page = await open("Aiko", {
+      // Tiny, as the puppet of graphics processors is drawn in software.
+      viewport: { width: 240, height: 180 },
+      before: async (page) => {
+        await pretendGraphicsProcessor(page);
+        await connectHeadset(page);
+      },
+    });
+    await pauseAtStart(page);
+    await stopDrawing(page);
+    await enterVr(page);
+    expect(await readMaterial(page)).toEqual({ type: "MeshPhysicalMaterial", invalidPrograms: 0 });
+    await expect.poll(() => readMaterial(page)).toEqual({ type: "ShaderMaterial", invalidPrograms: 0 });
   });
 
   test("an avatar dances in VR, too", async () => {
