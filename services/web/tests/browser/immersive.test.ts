@@ -2,6 +2,7 @@
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { createFigureFile } from "../avatar/figure-files";
+import { findViolations } from "./accessibility";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { evaluateInEngine } from "./engine-probe";
 import {
@@ -228,7 +229,9 @@ describeInBrowser("VR", { server: "open" }, (fixture) => {
   test("a session that is refused is reported, and so is a chunk that does not load", async () => {
     const page = await open("Aiko", { before: connectHeadset });
     await page.route("**/assets/session-chunk-*.js", (route) => route.abort());
-    const enter = () => page.getByRole("button", { name: "Enter VR" }).click();
+    await page.getByRole("button", { name: "Enter VR" }).focus();
+    expect(await findViolations(page)).toEqual([]);
+    const enter = () => page.keyboard.press("Enter");
     await waitForToast(page, "VR could not be loaded", enter);
     await page.evaluate(() => {
       (navigator.xr as XRSystem).requestSession = () => Promise.reject(new DOMException("", "NotAllowedError"));
