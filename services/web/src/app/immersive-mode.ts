@@ -116,7 +116,7 @@ export class ImmersiveMode {
     } catch (error) {
       this.#fail(REFUSED, error);
     }
-    this.#view.showMessage(translate("Close a hand on a ring to hold its string: trigger, squeeze or pinch"));
+    this.#view?.showMessage(translate("Close a hand on a ring to hold its string: trigger, squeeze or pinch"));
   }
 
   /** End the session, and throw the reason for the user. */
