@@ -1,11 +1,15 @@
-/** three.js's renderer without features that the page never uses. */
+/** three.js's renderer without features that the page never uses, or only after a click. */
+import { readFile } from "node:fs/promises";
 import type { Plugin } from "vite";
 
 /** Code of the modules without their features, by path in the folder of the sources. */
 export const REPLACED_MODULES: Readonly<Record<string, string>> = {
-  // The page presents no immersive session, so `isPresenting` never becomes true.
+  // Until `completeRenderer` is called, renderers present no immersive session: `isPresenting` never becomes true.
   "renderers/webxr/WebXRManager.js": `
+    let Complete = null;
+    export function completeWith(Manager) { Complete = Manager; }
     export class WebXRManager {
+      constructor(renderer, gl) { if (Complete) return new Complete(renderer, gl); }
       enabled = false;
       isPresenting = false;
       addEventListener() {}
@@ -14,8 +18,13 @@ export const REPLACED_MODULES: Readonly<Record<string, string>> = {
       getEnvironmentBlendMode() {}
       dispose() {}
     }`,
-  // Only the cameras of such a session are arrays.
-  "math/FrustumArray.js": "export class FrustumArray {}",
+  // Only the cameras of such a session are arrays. It culls nothing.
+  "math/FrustumArray.js": `
+    export class FrustumArray {
+      setFromArrayCamera() { return this; }
+      intersectsObject() { return true; }
+      intersectsSprite() { return true; }
+    }`,
   // No material has groups of uniforms.
   "renderers/webgl/WebGLUniformsGroups.js": "export function WebGLUniformsGroups() { this.dispose = () => {}; }",
   // The canvas has 8 bits per channel, so the renderer creates no output pass.
@@ -24,12 +33,23 @@ export const REPLACED_MODULES: Readonly<Record<string, string>> = {
 
 const MODULE = /\/three\/src\/((?:math|renderers\/web(?:gl|xr))\/\w+\.js)$/;
 
+/** The WebXR manager of three.js, and the module of the page that installs it. */
+const MANAGER = "three/src/renderers/webxr/WebXRManager.js";
+const COMPLETE = /\/WebXRManager\.js\?complete$/;
+const INSTALLER = /\/src\/immersive\/complete-renderer\.ts$/;
+
 /** Replaces `REPLACED_MODULES`. */
 export const reducedRenderer: Plugin = {
   name: "reduced-renderer",
   apply: "build",
   load: {
-    filter: { id: MODULE },
-    handler: (id) => REPLACED_MODULES[MODULE.exec(id)?.[1] ?? ""],
+    filter: { id: [MODULE, COMPLETE, INSTALLER] },
+    handler: (id) => {
+      if (COMPLETE.test(id)) return readFile(id.replace(/\?.*$/, ""), "utf8");
+      if (INSTALLER.test(id))
+        return `import { completeWith } from "${MANAGER}"; import { WebXRManager } from "${MANAGER}?complete";
+          export const completeRenderer = () => completeWith(WebXRManager);`;
+      return REPLACED_MODULES[MODULE.exec(id)?.[1] ?? ""];
+    },
   },
 };

@@ -75,6 +75,7 @@ export class App implements AppParts {
       limbs: this.limbs,
       getPlayback: () => this.playback,
       invitation: new Invitation(page.nameTags),
+      getAvatarFiles: () => this.avatarSlots.activeFiles,
       viewOnly: !pageAccess.allows("control"),
       isAlone: view !== null,
       getMapping: () => this.#mapping,

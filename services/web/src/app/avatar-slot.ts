@@ -44,6 +44,8 @@ export class AvatarSlot {
   /** Name of the loaded avatar, null for none. */
   #name: string | null = null;
   #isActive = false;
+  /** File of the loaded avatar. */
+  #file: File | null = null;
   /** File that is being loaded. A file chosen later replaces it. */
   #pendingFile: File | null = null;
 
@@ -58,6 +60,11 @@ export class AvatarSlot {
     const suffix = performer > 0 ? `.${performer + 1}` : "";
     [this.#fileKey, this.#activeKey] = [AVATAR_FILE_KEY + suffix, AVATAR_ACTIVE_KEY + suffix];
     this.#render();
+  }
+
+  /** File of the avatar that is shown, null if the puppet is. */
+  get activeFile(): File | null {
+    return this.#isActive ? this.#file : null;
   }
 
   /** Load the avatar of the last visit, if there was one. Later calls do nothing. */
@@ -100,7 +107,7 @@ export class AvatarSlot {
 
   /** Remove the avatar, also from the browser's storage. */
   async remove(): Promise<void> {
-    this.#pendingFile = this.#name = null;
+    this.#pendingFile = this.#name = this.#file = null;
     this.#isActive = false;
     this.options.avatars.remove(this.performer);
     this.#render();
@@ -117,6 +124,7 @@ export class AvatarSlot {
       const name = await this.options.avatars.load(this.performer, file);
       if (this.#pendingFile !== file || name === null) return false;
       this.#name = name;
+      this.#file = file;
       this.#pendingFile = null;
       this.#applyActive(active);
       return true;
@@ -165,6 +173,11 @@ export class AvatarSlots {
   /** Slot of the selected performer. */
   get selected(): AvatarSlot {
     return this.#slots[this.selectedPerformer.performer];
+  }
+
+  /** Files of the avatars that are shown, by performer; null where the puppet is. */
+  get activeFiles(): (File | null)[] {
+    return this.#slots.map(({ activeFile }) => activeFile);
   }
 
   /** Load the avatars of the last visit for the first `performerCount` performers. */

@@ -17,6 +17,8 @@ import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
 import { type EngineConnection, EngineError } from "./engine-connection";
 import { GamepadPolling } from "./gamepad-polling";
+import type { ImmersiveMode } from "./immersive-mode";
+import { watchForHeadset } from "./immersive-offer";
 import type { Invitation } from "./invitation";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
@@ -47,12 +49,16 @@ export interface StageHostOptions {
   isAlone: boolean;
   getPlayback(): Pick<PlaybackController, "current" | "onChange" | "onTime" | "onUnauthorized">;
   getMapping(): Mapping;
+  /** Return the files of the avatars that replace puppets, by performer. */
+  getAvatarFiles(): readonly (File | null)[];
 }
 
 export class StageHost {
   readonly #overlay: StageOverlay;
   readonly #gamepad: GamepadPolling;
   #isReady = false;
+  /** VR; null while it is not loaded. */
+  #immersive: ImmersiveMode | null = null;
 
   constructor(private readonly options: StageHostOptions) {
     const { canvas, page, limbs, getMapping } = options;
@@ -75,7 +81,10 @@ export class StageHost {
     this.#showLimbs(NO_CLAIMS);
     this.resize();
     addEventListener("resize", () => this.resize());
-    if (!this.options.isAlone) this.#listenToInputs();
+    if (!this.options.isAlone) {
+      this.#listenToInputs();
+      this.options.startup.runWhenFinished(() => watchForHeadset(() => void this.#loadImmersive()));
+    }
     // A page in the background draws no frames, so nothing would release the inputs that were pressed.
     document.addEventListener("visibilitychange", () => {
       this.#setSettings({ isHidden: document.hidden });
@@ -218,6 +227,13 @@ export class StageHost {
         this.#showContextLoss(event.isLost);
         break;
     }
+    this.#immersive?.onEvent(event);
+  }
+
+  /** Load VR once. Without a connection it stays absent: the next headset tries again. */
+  async #loadImmersive(): Promise<void> {
+    const chunk = await import("./immersive-mode").catch(() => null);
+    if (chunk) this.#immersive ??= new chunk.ImmersiveMode(this.options);
   }
 
   #setSettings(settings: Partial<EngineSettings>): void {

@@ -6,6 +6,7 @@ import { AvatarError } from "../avatar/error";
 import { Access } from "../client/access";
 import { ProblemError } from "../client/problem";
 import { createPageActions } from "../input/command-dispatcher";
+import type { HandState } from "../input/hand";
 import { DEFAULT_MAPPING } from "../input/mapping";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import { type Graphics, openGraphics } from "../stage/rendering/graphics";
@@ -13,6 +14,7 @@ import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
 import { AvatarModels } from "./avatar-models";
 import { changedParts } from "./changed-parts";
 import { ClaimController } from "./claim-controller";
+import type { ImmersiveController } from "./immersive-controller";
 import type {
   EngineCommand,
   EngineEvent,
@@ -57,6 +59,9 @@ export class Engine {
   #playbackNumber = 0;
   readonly #statisticsTimer: ReturnType<typeof setInterval>;
   #isClosed = false;
+  /** True while an immersive session shows the stage: it requests the frames. */
+  #isImmersive = false;
+  #immersive: ImmersiveController | null = null;
   #lastState: StageState | null = null;
   #lastPosition = NaN;
 
@@ -187,6 +192,9 @@ export class Engine {
       case "lead":
         this.#setLead(command.lead);
         break;
+      case "immersive":
+        void this.#onImmersive(command.hands);
+        break;
       case "request":
         void this.#respond(command.id, command.request);
         break;
@@ -270,12 +278,23 @@ export class Engine {
     if (this.#isClosed) return;
     requestAnimationFrame(() => this.#drawFrame());
     const controller = this.#controller;
-    if (!controller || !this.#describeStage) return;
+    if (!controller || !this.#describeStage || this.#isImmersive) return;
     const now = performance.now();
     const frame = controller.draw(now, this.#settings.focusedLimb);
     // What lies over the stage moves with what the canvas shows.
     if (controller.stage.isUpToDate) this.#sendFrame(this.#describeStage(controller, frame, this.#labels, now), now);
     this.#playback?.viewer.recordFrame(performance.now() - now);
+  }
+
+  /** Send the next frame of an immersive session with these hands; null ends it. */
+  async #onImmersive(hands: readonly HandState[] | null): Promise<void> {
+    this.#isImmersive = hands !== null;
+    // The session asks again for a frame that was not sent.
+    const chunk = await import("./immersive-controller").catch(() => null);
+    if (!chunk || !this.#controller) return;
+    this.#immersive ??= new chunk.ImmersiveController(this.#controller, this.#claims, this.#settings);
+    const frame = this.#immersive.advance(performance.now(), hands);
+    if (frame) this.send({ type: "immersive", frame });
   }
 
   /** Send what has changed since the last frame. */

@@ -5,13 +5,17 @@
 import type { CameraKeyframe, SessionEdit } from "../client/api";
 import type { ViewerStatistics } from "../client/viewer";
 import type { Language } from "../i18n/translator";
+import type { HandGrip, HandState, Triple } from "../input/hand";
 import type { Mapping, PageAction } from "../input/mapping";
 import type { PointerMessage } from "../input/pointer";
 import type { CommandMessage } from "../input/remote-commands";
+import type { Figure, Pose } from "../motion/skeleton";
+import type { LightState } from "../playout/light-state";
 import type { LeaderTime } from "../playout/presentation-clock";
 import type { Framing } from "../stage/camera/audience-camera";
 import type { ScreenBox } from "../stage/camera/screen-box";
 import type { Theme } from "../stage/scenery/look";
+import type { StringState } from "../stage/strings/strings";
 import type { LabelMetrics, LabelPositions } from "../ui/strings/label-layout";
 import type { Presence, TimelineState } from "../wire/messages";
 import type { AskOffer, ClaimState } from "./claim-controller";
@@ -103,7 +107,9 @@ export type EngineCommand =
   | { type: "remove avatar"; performer: number }
   /** Stage time that the sound presents at the time `at`; null without sound. */
   | { type: "lead"; lead: (LeaderTime & { readonly at: number }) | null }
-  | { type: "request"; id: number; request: EngineRequest };
+  | { type: "request"; id: number; request: EngineRequest }
+  /** Apply the hands of an immersive session, and send its next frame in place of drawing; null ends the session. */
+  | { type: "immersive"; hands: readonly HandState[] | null };
 
 /** Requests, each answered by one response. */
 export type EngineRequest =
@@ -142,6 +148,24 @@ export interface StageState {
   readonly isPointerNear: boolean;
   readonly isPulling: boolean;
 }
+
+/** What an immersive session shows at one instant. */
+export interface ImmersiveFrame {
+  /** Figures of all performers, and the turn to the front of the first (radians); null if they are unchanged. */
+  readonly figures: readonly Figure[] | null;
+  readonly front: number;
+  readonly poses: readonly (Pose | null)[];
+  /** Strings by limb number. */
+  readonly strings: readonly ImmersiveString[];
+  readonly lights: readonly LightState[];
+  /** Selected performer. */
+  readonly performer: number;
+  /** What each tracked hand does. */
+  readonly grips: readonly HandGrip[];
+}
+
+/** `StringState` without objects of three.js, which lose their methods in a message. */
+export type ImmersiveString = Omit<StringState, "pullTarget"> & { readonly pullTarget: Triple | null };
 
 /** Time of a viewer: what a position and the sound are computed from between two messages. */
 export interface ViewerTime {
@@ -204,4 +228,5 @@ export type EngineEvent =
   | { type: "limb notice"; text: string }
   /** A control was pressed or repeated that moves the selected limb, and there is none: the page runs the action. */
   | { type: "page action"; action: PageAction }
+  | { type: "immersive"; frame: ImmersiveFrame }
   | { type: "response"; id: number; result?: unknown; failure?: EngineFailure };

@@ -7,7 +7,8 @@ import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
 import { createPointerInput, type PointerInput } from "../input/pointer";
 import { VelocityInputs } from "../input/velocity-input";
-import type { Pose } from "../motion/skeleton";
+import type { Figure, Pose } from "../motion/skeleton";
+import type { LightState } from "../playout/light-state";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import type { Graphics } from "../stage/rendering/graphics";
 import { Stage } from "../stage/stage";
@@ -43,6 +44,16 @@ export interface FrameState {
   limbs: readonly LimbState[];
 }
 
+/** What the stage shows at one instant. */
+export interface StageContent {
+  poses: readonly (Pose | null)[];
+  limbs: readonly LimbState[];
+  strings: readonly StringState[];
+  lights: readonly LightState[];
+  /** Seconds since the last one. */
+  seconds: number;
+}
+
 export class StageController {
   readonly stage: Stage;
   readonly hands: LimbController;
@@ -52,6 +63,9 @@ export class StageController {
   readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
   #lastDrawMs = 0;
+  /** Figures of the performers, other ones after each change, and the turn to the front of the first. */
+  figures: readonly Figure[] = [];
+  front = 0;
   /** Last selected performer, and the time in milliseconds until which its rings are highlighted. */
   #ringHighlight = { performer: 0, until: 0 };
 
@@ -111,22 +125,36 @@ export class StageController {
 
   /** Show the performers of the playback, as far as their skeletons were received. */
   updatePerformers(): void {
-    const { performers = [], figure, front } = this.#playback?.viewer ?? {};
+    const { performers = [], figure, front = 0 } = this.#playback?.viewer ?? {};
+    if (!figure) return;
     // A performer whose track cannot be decoded keeps its index, and is never drawn.
-    if (figure)
-      this.stage.setFigures(
-        performers.map((performer) => performer?.figure ?? figure),
-        front,
-      );
+    this.figures = performers.map((performer) => performer?.figure ?? figure);
+    this.front = front;
+    this.stage.setFigures(this.figures, front);
   }
 
   /** Draw the frame of local time `now` in milliseconds. `focusedLimb` is the limb whose control has the focus. */
   draw(now: number, focusedLimb: number | null = null): FrameState {
-    const { limbController, hands, pointer, stage, velocity } = this;
+    const { limbController, pointer, stage } = this;
+    const viewer = this.#playback?.viewer;
+    pointer.update(now);
+    const { poses, limbs, strings, lights, seconds } = this.advance(now, [focusedLimb]);
+    // The camera must not move under a finger that drags a limb.
+    if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : this.selectedPerformer;
+    const camera = this.#camera ?? viewer?.cameraAt(now);
+    stage.draw(poses, strings, seconds, camera, lights, viewer?.presentationTime(now));
+    return { pose: poses[0] ?? null, limbs };
+  }
+
+  /**
+   * Advance limbs that move by velocity, and return the content of the stage at local time `now` in milliseconds.
+   * `highlightedLimbs` are highlighted in addition to those of pointer and selection.
+   */
+  advance(now: number, highlightedLimbs: readonly (number | null)[] = []): StageContent {
+    const { hands, limbController, pointer, velocity } = this;
     const viewer = this.#playback?.viewer;
     const seconds = (now - this.#lastDrawMs) / 1000;
     this.#lastDrawMs = now;
-    pointer.update(now);
     velocity.update(now);
     const poses = viewer?.performers.map((_, performer) => viewer.poseAt(now, performer)) ?? [];
     const limbs = limbController.limbStates();
@@ -136,24 +164,20 @@ export class StageController {
         performer: selection.performer,
         until: selection.count > 1 ? now + RING_HIGHLIGHT_MS : 0,
       };
-    const states = limbs.map(({ holder, selected }, limb): StringState => {
+    const strings = limbs.map(({ holder, selected }, limb): StringState => {
       const isSelected = performerOfLimb(limb) === selection.performer;
       return {
         puppeteer: holder?.colour ?? null,
         isHighlighted:
           pointer.hoveredLimb === limb ||
-          focusedLimb === limb ||
+          highlightedLimbs.includes(limb) ||
           selected ||
           (isSelected && now < this.#ringHighlight.until),
         pullTarget: hands.pullTarget(limb),
         isDimmed: !isSelected,
       };
     });
-    // The camera must not move under a finger that drags a limb.
-    if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : selection.performer;
-    const camera = this.#camera ?? viewer?.cameraAt(now);
-    stage.draw(poses, states, seconds, camera, viewer?.lightsAt(now), viewer?.presentationTime(now));
-    return { pose: poses[0] ?? null, limbs };
+    return { poses, limbs, strings, lights: viewer?.lightsAt(now) ?? [], seconds };
   }
 
   /**

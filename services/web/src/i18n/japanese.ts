@@ -50,6 +50,18 @@ export const JAPANESE_PAGE_MESSAGES = {
     "リンクをコピーしました。{time}まで、リンクを知っている人が観られます",
   "Copy this link: {link}": "このリンクをコピーしてください：{link}",
   "Keys and gamepad": "キーとゲームパッド",
+  "Enter VR": "VRに入る",
+  "Leave VR": "VRを出る",
+  "Size in VR: as large as life": "VRでの大きさ：実物大",
+  "Size in VR: a quarter": "VRでの大きさ：四分の一",
+  "VR could not start. Check that the headset is connected and that this site may use it":
+    "VRを始められませんでした。ヘッドセットの接続と、このサイトでの使用の許可を確認してください",
+  "VR could not be loaded. Check your connection, then try again":
+    "VRを読み込めませんでした。接続を確認してから、もう一度お試しください",
+  "VR has ended, as the browser stopped its graphics. You can enter it again":
+    "ブラウザーが描画を止めたため、VRが終わりました。もう一度入れます",
+  "Close a hand on a ring to hold its string: trigger, squeeze or pinch":
+    "輪のところで手を閉じると糸を持てます（トリガー、グリップ、指でつまむ）",
   "Light theme": "明るいテーマ",
   "Dark theme": "暗いテーマ",
   "{count} here": "{count}人が観劇中",

@@ -10,7 +10,7 @@ import type { Stage } from "../stage/stage";
 import { limbWithinPerformer, MAX_LIMBS, performerOfLimb } from "../wire/limbs";
 import { orientationOf, positionOf, solveThighAngle, toChestFrame, toShoulderFrame } from "./target-frame";
 
-/** Source that holds a limb: a pointer that it follows, or inputs (keys, gamepad, buttons) that set its velocity. */
+/** Source that holds a limb: a pointer or a hand that it follows, or inputs (keys, gamepad, buttons) that set its velocity. */
 export type HoldSource = "pointer" | "velocity";
 
 export class LimbController {

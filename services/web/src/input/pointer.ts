@@ -11,7 +11,7 @@ import { OneEuro, smoothingSettings } from "./one-euro";
 export const GRAB_RADIUS_PX = 44;
 const ORBIT_RAD_PER_PX = 0.005;
 /** Beta of the smoothing of the pull target, in Hz per metre per second. */
-const PULL_BETA = 12;
+export const PULL_BETA = 12;
 /**
  * Full speed towards and away from the audience in metres per second, and how far the limb may lag behind, in metres.
  */

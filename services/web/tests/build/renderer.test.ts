@@ -16,8 +16,8 @@ const evaluate = (path: string) =>
 
 test("each replaced module exists and has the exports of its replacement", async () => {
   for (const path of Object.keys(REPLACED_MODULES)) {
-    const [name] = Object.keys(await evaluate(path));
-    expect(read(path)).toMatch(new RegExp(`export (class|function|\\{) ?${name}\\b`));
+    const names = Object.keys(await evaluate(path)).filter((name) => name !== "completeWith");
+    for (const name of names) expect(read(path)).toMatch(new RegExp(`export (class|function|\\{) ?${name}\\b`));
   }
 });
 
@@ -28,6 +28,22 @@ test("the replaced WebXR manager has what the renderer uses without a session", 
   const used = new Set(Array.from(sources.matchAll(/\bxr\.(\w+)/g), ([, member]) => member));
   expect(used.size).toBeGreaterThan(10);
   expect([...used].filter((member) => !(member in xr)).sort()).toEqual(SESSION_MEMBERS);
+});
+
+test("a completed renderer has the WebXR manager of three.js", async () => {
+  const replaced = await evaluate("renderers/webxr/WebXRManager.js");
+  class Manager {}
+  (replaced["completeWith"] as unknown as (manager: unknown) => void)(Manager);
+  expect(new replaced["WebXRManager"]()).toBeInstanceOf(Manager);
+});
+
+test("the replaced array of frusta has what objects ask it", async () => {
+  const { FrustumArray } = await evaluate("math/FrustumArray.js");
+  const frusta = new FrustumArray();
+  for (const file of ["objects/Mesh.js", "objects/Sprite.js", "objects/Line.js", "objects/Points.js"]) {
+    const [, method] = /frustum\.(\w+)\( this \)/.exec(read(file)) ?? [];
+    expect((frusta as Record<string, () => boolean>)[method]()).toBe(true);
+  }
 });
 
 test("the replaced groups of uniforms have what the renderer uses without groups", async () => {

@@ -170,3 +170,12 @@ test("a rejected token is reported, and limbs are not offered to viewers", async
   engine.handle({ type: "limb", action: "toggle", limb: 0 });
   expect(eventsOf("limbs").every(({ state }) => !state.isReady)).toBe(true);
 });
+
+test("an immersive session gets no frames without a stage", async () => {
+  openSession();
+  engine.handle({ type: "immersive", hands: [] });
+  engine.handle({ type: "immersive", hands: null });
+  await import("../../src/engine/immersive-controller");
+  await Promise.resolve();
+  expect(eventsOf("immersive")).toEqual([]);
+});

@@ -41,6 +41,8 @@ const FREE_STRING: StringState = { puppeteer: null, isHighlighted: false, pullTa
 const DIMMED_SHARE = 0.42;
 const HIDDEN_POSITION = new Vector3();
 
+/** Lengths of the threads of free limbs, for hands and legs, in metres for the standard figure. */
+export const FREE_THREAD_LENGTH_M = [0.62, 0.26] as const;
 /** Pull error at which a thread is fully taut, in metres. */
 const TAUT_ERROR_M = 0.25;
 /** Minimum heights of bars above the floor, for hands and legs, in metres for the standard figure. */
@@ -183,7 +185,7 @@ export class Strings {
         fadesOut: false,
       });
     } else {
-      const top = ringPosition.clone().setY(ringPosition.y + (limbIndex < 2 ? 0.62 : 0.26) * scale);
+      const top = ringPosition.clone().setY(ringPosition.y + FREE_THREAD_LENGTH_M[limbIndex < 2 ? 0 : 1] * scale);
       const alpha = look.threadOpacity * (state.isDimmed ? DIMMED_SHARE : 1);
       this.#threads.set(limb, ringPosition, top, {
         colour: look.threadColour,
