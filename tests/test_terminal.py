@@ -12,7 +12,7 @@ import typer
 from rich.table import Table
 
 from bunraku import terminal
-from bunraku.client.api import ServerProblem
+from bunraku.client.server_problem import ServerProblem
 from tests.time_limit import HANG_TIMEOUT_S
 
 

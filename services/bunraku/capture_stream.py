@@ -14,9 +14,10 @@ import httpx2
 from websockets.exceptions import WebSocketException
 
 from bunraku.capture.session import TimedPose
-from bunraku.client.api import Client, ServerProblem
+from bunraku.client.api import Client
 from bunraku.client.performer import Performer
 from bunraku.client.reconnecting_connection import StreamEnded
+from bunraku.client.server_problem import ServerProblem
 from bunraku.motion.skeleton import Figure
 from bunraku.wire.live import Sample
 

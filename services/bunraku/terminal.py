@@ -97,7 +97,7 @@ def parse_resource_address(address: str) -> tuple[str | None, str | None, str]:
 
 async def find_resource_kind(client: Client, resource_id: str) -> str:
     """Return whether an id belongs to `sessions` or `motions`. Raises `ServerProblem` if it belongs to neither."""
-    from bunraku.client.api import ServerProblem
+    from bunraku.client.server_problem import ServerProblem
 
     try:
         await client.session(resource_id)
@@ -166,7 +166,7 @@ def run_request(request: Callable[[], Awaitable[Result]], server: str) -> Result
     import httpx2
     from websockets.exceptions import WebSocketException
 
-    from bunraku.client.api import ServerProblem
+    from bunraku.client.server_problem import ServerProblem
 
     async def run() -> Result:
         return await request()

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 import uvloop
 
-from bunraku.client.api import Client, authorization
+from bunraku.client.api import Client
+from bunraku.client.authorization import authorization
 from bunraku.client.message_socket import MessageSocket
 from bunraku.wire.messages import Ping
 from bunraku.wire.overlay import Overlay

@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.client import Client, Puppeteer
+from bunraku.client import Client, Performer, Puppeteer
 from bunraku.client.datagram import DatagramSender
 from bunraku.client.stage_output import VmcOutput
 from bunraku.codec import live as live_codec
@@ -39,6 +39,7 @@ from bunraku.motion.rotation import Array
 from bunraku.playout.block_store import Pose
 from bunraku.serve import WARM_UP_DELAY_S
 from tests.bench.fanout_processes import LineProcess
+from tests.bench.live_sender import bounce
 from tests.bench.live_stage import (
     CAPTURE_FPS,
     PACKET_HEADER_BYTES,
@@ -273,6 +274,7 @@ async def measure_faults(bench: Bench, server: Server) -> Figures:
         "loss_accel_ratio_p99": round(ratio, 2),
         "clean_accel_m_s2_p99": percentile(clean, 99),
         "faulty_accel_m_s2_p99": percentile(faulty, 99),
+        "clean_accel_m_s2_max": round(float(clean.max()), 1),
         "faulty_accel_m_s2_max": round(float(faulty.max()), 1),
         "faulty_missing": captures[1].statistics["missing"],
         "faulty_late": captures[1].statistics["late"],
@@ -292,13 +294,17 @@ def joint_accelerations(viewer: RecordingViewer) -> Array:
 
 
 async def measure_fanout(bench: Bench, server: Server) -> Figures:
-    """Measure the part fanout."""
+    """Measure the part fanout. The performers are in this process: capture tools would take time from the server."""
     sources = [bench.source(name) for name in ("mass_dance", "perfume_A", "mass_walk", "cmu_12_01_walk")]
     async with AsyncExitStack() as stack:
-        first = await stack.enter_async_context(run_capture_process(server.url, sources[0]))
-        for source in sources[1:]:
-            await stack.enter_async_context(run_capture_process(server.url, source, "--session", first.session))
-        url = Client(server.url).socket_url(f"/v1/sessions/{first.session}/stream?tracks=motion")
+        client = await stack.enter_async_context(Client(server.url))
+        session = None
+        for source in sources:
+            performer = await stack.enter_async_context(client.perform(source.figure, session=session))
+            session = performer.session
+            sending = asyncio.create_task(_send_poses(source, performer))
+            stack.callback(sending.cancel)
+        url = client.socket_url(f"/v1/sessions/{session}/stream?tracks=motion")
         crowd = stack.enter_context(LineProcess.start_module("fanout_crowd", url, "talk"))
 
         async def command(line: str) -> dict[str, Any]:
@@ -311,17 +317,28 @@ async def measure_fanout(bench: Bench, server: Server) -> Figures:
         await command("count")
         before, begun = cpu_seconds(server.pid), time.monotonic()
         await asyncio.sleep(bench.seconds / 2)
-        cores = (cpu_seconds(server.pid) - before) / (time.monotonic() - begun)
+        passed = time.monotonic() - begun
+        cores = (cpu_seconds(server.pid) - before) / passed
         figures = await command("figures")
     return {
         "cores_4x500": round(cores, 2),
         "gap_ms_p99_4x500": figures["live_gap_ms_p99"],
         "late_ms_p99_4x500": figures["live_late_ms_p99"],
-        "live_messages_4x500": figures["live_messages"],
+        "live_messages_per_s_4x500": round(figures["live_messages"] / figures["seconds"] / joined["joined"], 1),
         "viewers_4x500": joined["joined"],
         "dropped_4x500": figures["dropped"],
         "kbps_4x500": round(figures["bytes_per_second"] * 8e-3, 1),
     }
+
+
+async def _send_poses(source: Source, performer: Performer) -> None:
+    """Send the poses of a source at 60 frames per second."""
+    begin_s, number = time.monotonic(), 0
+    while True:
+        at_s, frame = begin_s + number / CAPTURE_FPS, bounce(number, len(source.roots))
+        await asyncio.sleep(max(at_s - time.monotonic(), 0.0))
+        await performer.frame((source.roots[frame], source.rotations[frame]), at_s)
+        number += 1
 
 
 async def measure_output(bench: Bench, server: Server) -> Figures:

@@ -14,8 +14,9 @@ from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
+from bunraku.client import Client
 from bunraku.http.access_control import Role
-from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Problem, Welcome, unpack
+from bunraku.wire.messages import SUBPROTOCOL, ChannelHeader, Ping, Pong, Problem, Welcome, unpack
 from tests.credentials import OTHER_SECRET, SECRET, bearer_headers, make_token, make_unsigned_token, sign_token
 from tests.servers import make_bvh_clip, run_server
 from tests.time_limit import HANG_TIMEOUT_S
@@ -50,13 +51,18 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("POST", "/v1/motions/{motion}/audio"): Role.INGEST,
     ("POST", "/v1/motions/{motion}/scene"): Role.INGEST,
     ("POST", "/v1/motions/{motion}/performers"): Role.INGEST,
+    ("POST", "/v1/performers"): Role.INGEST,
+    ("GET", "/v1/performers/{performer}"): Role.INGEST,
+    ("DELETE", "/v1/performers/{performer}"): Role.INGEST,
     ("GET", "/v1/uploads/{upload}"): Role.INGEST,
     ("DELETE", "/v1/motions/{motion}"): Role.INGEST,
 }
+INPUT = "/v1/performers/{performer}/input"
 WEBSOCKETS: dict[str, Role] = {
     "/v1/motions/{motion}/stream": Role.VIEW,
     "/v1/sessions/{session}/stream": Role.VIEW,
     "/v1/sessions/{session}/control": Role.CONTROL,
+    INPUT: Role.INGEST,
 }
 INVALID_TOKENS: dict[str, Callable[[], str | None]] = {
     "none": lambda: None,
@@ -102,6 +108,7 @@ class GuardedServer:
             "name": "circle",
             "upload": "unknown-upload",
             "share": "0" * 18,
+            "performer": f"{self.session}-0000000000",
         }
         return path.format(**parameters)
 
@@ -214,6 +221,8 @@ async def test_invalid_token_closes_every_websocket_with_4401(guarded: GuardedSe
 async def test_websocket_accepts_token_or_single_use_ticket_by_role(guarded: GuardedServer, role: Role) -> None:
     async with httpx2.AsyncClient(base_url=guarded.url, headers=bearer_headers(make_token(role))) as http:
         for path, required_role in WEBSOCKETS.items():
+            if path == INPUT:
+                continue
             address = guarded.url.replace("http", "ws") + guarded.fill_path(path)
             ticket = (await http.post("/v1/tickets")).json()["ticket"]
             assert len(ticket) < 64
@@ -230,11 +239,49 @@ async def test_websocket_accepts_token_or_single_use_ticket_by_role(guarded: Gua
 
 async def test_missing_subprotocol_closes_with_4406(guarded: GuardedServer) -> None:
     for path in WEBSOCKETS:
+        if path == INPUT:
+            continue
         async with connect(guarded.url.replace("http", "ws") + guarded.fill_path(path)) as socket:
             with pytest.raises(ConnectionClosed) as closed:
                 await read_until_closed(socket)
         assert closed.value.rcvd is not None
         assert closed.value.rcvd.code == 4406
+
+
+@pytest.mark.parametrize("role", Role)
+async def test_input_socket_accepts_those_who_brought_the_performer(guarded: GuardedServer, role: Role) -> None:
+    async with Client(guarded.url, token=make_token(Role.INGEST, "aiko")) as aiko, aiko.perform() as performer:
+        path = performer.description["input"]
+        address = guarded.url.replace("http", "ws") + path
+        async with httpx2.AsyncClient(
+            base_url=guarded.url, headers=bearer_headers(make_token(role, "aiko")), timeout=HANG_TIMEOUT_S
+        ) as http:
+            ticket = (await http.post("/v1/tickets")).json()["ticket"]
+            for query, headers in (("", bearer_headers(make_token(role, "aiko"))), (f"?ticket={ticket}", {})):
+                async with connect(address + query, subprotocols=[SUBPROTOCOL], additional_headers=headers) as socket:  # type: ignore[list-item]
+                    if role >= Role.INGEST:
+                        await socket.send(Ping(1, 2).pack())
+                        assert isinstance(unpack(await socket.recv(decode=False)), Pong)
+                        continue
+                    with pytest.raises(ConnectionClosed) as closed:
+                        await read_until_closed(socket)
+                    assert closed.value.rcvd is not None
+                    assert closed.value.rcvd.code == 4403
+            async with connect(address, additional_headers=bearer_headers(make_token(Role.INGEST, "aiko"))) as plain:
+                with pytest.raises(ConnectionClosed) as closed:
+                    await read_until_closed(plain)
+                assert closed.value.rcvd is not None
+                assert closed.value.rcvd.code == 4406
+        # another subject sees the performer on the stage, but cannot move or end it
+        yuki = bearer_headers(make_token(Role.INGEST, "yuki"))
+        async with httpx2.AsyncClient(base_url=guarded.url, headers=yuki, timeout=HANG_TIMEOUT_S) as http:
+            for method in ("GET", "DELETE"):
+                assert (await http.request(method, path.removesuffix("/input"))).status_code == 403
+        async with connect(address, subprotocols=[SUBPROTOCOL], additional_headers=yuki) as socket:  # type: ignore[list-item]
+            with pytest.raises(ConnectionClosed) as closed:
+                await read_until_closed(socket)
+            assert closed.value.rcvd is not None
+            assert closed.value.rcvd.code == 4403
 
 
 async def test_bound_token_sees_nothing_but_its_resource(guarded: GuardedServer) -> None:

@@ -19,7 +19,7 @@ from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure, world_transforms
 from bunraku.playout.block_store import Pose
-from bunraku.session import performer_endpoint
+from bunraku.session.live import performer_endpoint
 from tests.capture.capture_process import FPS, performing, run_capture
 from tests.capture.samples import PELVIS, sample_analysis
 from tests.credentials import SECRET, make_token

@@ -46,6 +46,7 @@ async def test_every_route_declares_its_requirement(tmp_path: Path) -> None:
         "/v1/motions/{motion}/stream": Role.VIEW,
         "/v1/sessions/{session}/stream": Role.VIEW,
         "/v1/sessions/{session}/control": Role.CONTROL,
+        "/v1/performers/{performer}/input": Role.INGEST,
     }
 
 

@@ -21,7 +21,7 @@ from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import session_manager
-from bunraku.session.cast import EMPTY_CAST
+from bunraku.session.live.cast import EMPTY_CAST
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.session_registry import SessionRecord, session_key
 from bunraku.session.stage import Stage

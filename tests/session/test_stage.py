@@ -16,7 +16,7 @@ from bunraku.playout import timeline
 from bunraku.playout.session_log import SessionLog
 from bunraku.runtime.clock import clock
 from bunraku.session import puppeteer_roster
-from bunraku.session.cast import EMPTY_CAST, Cast
+from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.session.presence import PRESENCE_BURST
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
 from bunraku.session.schema import SessionEdit

@@ -15,8 +15,8 @@ from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
 from bunraku.session import puppeteer_roster, stage_endpoint
-from bunraku.session.cast import Cast
-from bunraku.session.cast_store import CastStore
+from bunraku.session.live.cast import Cast
+from bunraku.session.live.cast_store import CastStore
 from bunraku.session.schema import SessionEdit
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.session.stage_endpoint import StageEndpoint

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import uvloop
 
-from bunraku.client.api import authorization
+from bunraku.client.authorization import authorization
 from bunraku.client.load_generator import RESERVED_FILE_DESCRIPTORS, _raise_file_limit
 from bunraku.client.message_socket import MessageSocket
 from bunraku.wire.messages import Ping, Report

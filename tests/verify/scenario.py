@@ -15,7 +15,8 @@ from pathlib import Path
 
 import httpx2
 
-from bunraku.client.api import Client, ServerProblem
+from bunraku.client.api import Client
+from bunraku.client.server_problem import ServerProblem
 from tests.servers import make_bvh_clip
 from tests.verify.participant import MonitoredPuppeteer, MonitoredViewer
 from tests.verify.stack import Stack

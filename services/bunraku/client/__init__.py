@@ -6,11 +6,12 @@ Names are imported at their first use, so that listing motions does not load a d
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bunraku.client.api import Client, ServerProblem
+    from bunraku.client.api import Client
     from bunraku.client.one_euro import OneEuro
     from bunraku.client.performer import Performer
     from bunraku.client.puppeteer import ControlRefused, Puppeteer
     from bunraku.client.reconnecting_connection import StreamEnded
+    from bunraku.client.server_problem import ServerProblem
     from bunraku.client.viewer import Viewer
     from bunraku.client.viewer_statistics import ViewerStatistics
 
@@ -20,7 +21,7 @@ _HOMES = {
     "OneEuro": "one_euro",
     "Performer": "performer",
     "Puppeteer": "puppeteer",
-    "ServerProblem": "api",
+    "ServerProblem": "server_problem",
     "StreamEnded": "reconnecting_connection",
     "Viewer": "viewer",
     "ViewerStatistics": "viewer_statistics",

@@ -13,6 +13,9 @@ from urllib.parse import quote, urlsplit, urlunsplit
 
 import httpx2
 
+from bunraku.client.authorization import authorization
+from bunraku.client.server_problem import ServerProblem
+
 if TYPE_CHECKING:
     from bunraku.client.performer import Performer
     from bunraku.motion.skeleton import Figure
@@ -22,22 +25,6 @@ REQUEST_TIMEOUT = httpx2.Timeout(10.0, read=130.0)
 CHUNK_BYTES = 1 << 16
 PROGRESS_INTERVAL_S = 0.25
 """Interval between queries of an upload's progress."""
-
-
-def authorization(token: str | None) -> dict[str, str]:
-    """Return the `Authorization` header of a token, or no header without one."""
-    return {} if token is None else {"Authorization": f"Bearer {token}"}
-
-
-class ServerProblem(Exception):
-    """Error answer of the server: an RFC 9457 problem document, `body`, with its HTTP `status`."""
-
-    def __init__(self, status: int, body: dict[str, Any]) -> None:
-        line = f"line {body['line']}: " if body.get("line") else ""
-        hint = f" ({body['hint']})" if body.get("hint") else ""
-        super().__init__(f"{body.get('title', 'Problem')}: {line}{body.get('detail', '')}{hint}")
-        self.status = status
-        self.body = body
 
 
 class Client:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.client.api import authorization
+from bunraku.client.authorization import authorization
 from bunraku.client.load_viewer import LoadState, LoadViewer
 
 SEND_SLOTS = 50

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from typing import Any, Self
+from collections.abc import Mapping
+from typing import Any, Protocol, Self
 
 import httpx2
 
-from bunraku.client.api import Client, ServerProblem, authorization
+from bunraku.client.authorization import authorization
 from bunraku.client.reconnecting_connection import ReconnectingConnection, StreamEnded
+from bunraku.client.server_problem import ServerProblem
 from bunraku.motion.skeleton import JOINTS, TIP_JOINTS, Figure, standard_figure
 from bunraku.playout.block_store import Pose
 from bunraku.playout.clock import ReferenceClock
@@ -27,6 +29,24 @@ FLUSH_TIMEOUT_S = 3.0
 """Time in which the last samples are received before the performance ends."""
 
 
+class PerformerServer(Protocol):
+    """Client of the server on which a performer performs. Methods raise `ServerProblem`."""
+
+    token: str | None
+
+    async def create_performer(self, new: Mapping[str, Any]) -> dict[str, Any]:
+        """Bring a live performer on a stage."""
+
+    async def performer(self, performer: str) -> dict[str, Any]:
+        """Return one live performer."""
+
+    async def end_performer(self, performer: str) -> None:
+        """End a performance."""
+
+    def socket_url(self, path: str) -> str:
+        """Return the WebSocket URL of a path of the server."""
+
+
 class Performer:
     """Live performer on the stage of a session. Use as an async context manager; leaving it ends the performance.
 
@@ -35,7 +55,7 @@ class Performer:
 
     def __init__(
         self,
-        client: Client,
+        client: PerformerServer,
         figure: Figure | None = None,
         *,
         name: str = "",

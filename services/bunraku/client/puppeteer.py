@@ -11,7 +11,8 @@ from urllib.parse import quote
 from websockets.asyncio.client import ClientConnection, connect
 from websockets.exceptions import ConnectionClosed
 
-from bunraku.client.api import Client, authorization
+from bunraku.client.api import Client
+from bunraku.client.authorization import authorization
 from bunraku.client.one_euro import OneEuro
 from bunraku.wire.limbs import limb_number
 from bunraku.wire.messages import (

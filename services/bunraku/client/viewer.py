@@ -10,7 +10,7 @@ from urllib.parse import parse_qsl, urlencode, urlsplit
 
 import numpy as np
 
-from bunraku.client.api import authorization
+from bunraku.client.authorization import authorization
 from bunraku.client.reconnecting_connection import SILENCE_TIMEOUT_S, ReconnectingConnection, StreamEnded
 from bunraku.client.reporter import ViewerReporter
 from bunraku.client.viewer_statistics import ViewerStatistics

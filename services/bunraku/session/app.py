@@ -21,7 +21,7 @@ from bunraku.runtime import worker_process
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
 from bunraku.session import control_endpoint, metrics, recorder
-from bunraku.session.performers import Performers
+from bunraku.session.live.performers import Performers
 from bunraku.session.recording import MAX_BODY_BYTES, PackedRecording, Recording, parse_recording
 from bunraku.session.schema import NewPerformer, NewSession, SessionEdit
 from bunraku.session.session_manager import SessionManager
@@ -120,7 +120,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             await control_endpoint.serve_puppeteer(socket, stage, context, name, sessions.counters)
 
     @app.post("/v1/performers", status_code=201, tags=["performers"])
-    @requires(Role.INGEST, allow_bound=True, max_body_bytes=MAX_PERFORMER_BODY_BYTES)
+    @requires(Role.INGEST, max_body_bytes=MAX_PERFORMER_BODY_BYTES)
     async def create_performer(new: NewPerformer, request: Request) -> JSONResponse:
         """Bring a live performer on the stage of a session, or of a new one.
 
@@ -131,19 +131,19 @@ def create_app(context: ServiceContext) -> FastAPI:
         return JSONResponse(performer, 201, {"Location": f"/v1/performers/{performer['id']}"})
 
     @app.get("/v1/performers/{performer}", tags=["performers"])
-    @requires(Role.INGEST, allow_bound=True)
+    @requires(Role.INGEST)
     async def describe_performer(performer: str, request: Request) -> dict[str, Any]:
         """Describe one live performer: its number on the stage, its delay and its samples by outcome."""
         return await performers.describe(performer, access_of(request))
 
     @app.delete("/v1/performers/{performer}", status_code=204, tags=["performers"])
-    @requires(Role.INGEST, allow_bound=True)
+    @requires(Role.INGEST)
     async def end_performer(performer: str, request: Request) -> None:
         """End a performance. Its motion appears in the library within seconds."""
         await performers.end(performer, access_of(request))
 
     @app.websocket("/v1/performers/{performer}/input")
-    @requires(Role.INGEST, allow_bound=True)
+    @requires(Role.INGEST)
     async def perform(socket: WebSocket, performer: str) -> None:
         with contextlib.suppress(WebSocketDisconnect):
             await performers.serve_input(socket, performer)

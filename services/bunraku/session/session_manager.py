@@ -23,9 +23,9 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast
-from bunraku.session.cast_store import CastStore
 from bunraku.session.counters import SessionCounters
+from bunraku.session.live.cast import Cast
+from bunraku.session.live.cast_store import CastStore
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRecord, SessionRegistry
 from bunraku.session.stage import SessionStart, Stage, load_bend_tables
 from bunraku.session.stage_endpoint import StageEndpoint, session_json

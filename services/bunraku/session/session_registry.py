@@ -18,7 +18,7 @@ from bunraku.messaging.bus import Subscription
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, KeyValueStore, KeyValueView, RevisionConflict
 from bunraku.messaging.replica_registry import DEFAULT_TIMING, ReplicaRegistry, ReplicaTiming
 from bunraku.runtime.availability import BackendUnavailable
-from bunraku.session.cast import EMPTY_CAST, Cast
+from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.wire.messages import TimelineState, unpack
 
 MAX_OWN_CONFLICTS = 8

@@ -29,10 +29,10 @@ from bunraku.playout.block_store import Pose
 from bunraku.playout.overlay_buffer import pack_overlay
 from bunraku.playout.performance import SampleOutcome
 from bunraku.playout.session_log import SessionLog
-from bunraku.session.cast import EMPTY_CAST, Cast
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
-from bunraku.session.live_performers import LivePerformers
+from bunraku.session.live.cast import EMPTY_CAST, Cast
+from bunraku.session.live.live_performers import LivePerformers
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.presence import PresencePublisher
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster

@@ -4,7 +4,7 @@ On `session.{id}.` it responds to the requests `describe`, `edit`, `log`, `end` 
 as the API shows it, or `{"problem": ...}`. Puppeteers publish their messages on `said` as `[puppeteer, message]`; None
 means that the puppeteer has left, and an empty message is a heartbeat. Messages to a puppeteer are published on
 `told.{puppeteer}`; an empty one means that the stage does not know the puppeteer. Live performers have requests and
-messages of their own (`bunraku.session.performer_endpoint`).
+messages of their own (`bunraku.session.live.performer_endpoint`).
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from bunraku.playout.timeline import position_at
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import EMPTY_CAST, Cast
-from bunraku.session.cast_store import CastStore
-from bunraku.session.performer_endpoint import PerformerEndpoint
+from bunraku.session.live.cast import EMPTY_CAST, Cast
+from bunraku.session.live.cast_store import CastStore
+from bunraku.session.live.performer_endpoint import PerformerEndpoint
 from bunraku.session.puppeteer_input import PuppeteerInput
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit

@@ -10,7 +10,7 @@ from bunraku.http.problem_details import session_not_found
 from bunraku.messaging.bus import Bus, NoResponse, is_subject_token
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueStore
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast, CastMember
+from bunraku.session.live.cast import Cast, CastMember
 from bunraku.session.schema import SessionEdit
 
 LOG_TIMEOUT_S = 10.0

@@ -17,6 +17,7 @@ import type { Exporter } from "./exporter";
 import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
+import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
 import type { SoundController } from "./sound-controller";
@@ -82,7 +83,7 @@ export function createUserActions(app: AppParts): UserActions {
     labels: (metrics) => app.stageHost.setLabels(metrics),
     mappingShown: () => app.stageHost.pollGamepad(),
     ...(pageAccess.allows("ingest")
-      ? { keep: createPageRecordAction(app), captureTarget: () => captureTarget(app.playback) }
+      ? { keep: createPageRecordAction(app), captureTarget: () => captureTarget(app.playback.current) }
       : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
@@ -126,12 +127,8 @@ function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly Fi
   void uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
 }
 
-function captureTarget({ current }: PlaybackController): CaptureTarget {
-  return {
-    server: location.origin,
-    session: current?.kind === "sessions" ? current.id : null,
-    needsToken: pageAccess.hasToken,
-  };
+function captureTarget(playback: RemotePlayback | null): CaptureTarget {
+  return { session: playback?.kind === "sessions" ? playback.id : null, needsToken: pageAccess.hasToken };
 }
 
 function savePicture({ exporter, library }: AppParts): void {

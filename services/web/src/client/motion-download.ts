@@ -4,7 +4,7 @@ import { DamagedBlock } from "../codec/errors";
 import { MotionTrack } from "../codec/motion-track";
 import { parseTiming } from "../codec/timing";
 import { MotionBlockStore } from "../playout/block-store";
-import { unpack } from "../wire/codec";
+import { unpackServerMessage } from "../wire/client-codec";
 import { MalformedMessage } from "../wire/errors";
 import type { Message } from "../wire/messages";
 import { pageAccess } from "./access";
@@ -73,7 +73,7 @@ async function fetchMessage<Name extends Message["name"]>(
   signal?: AbortSignal,
 ): Promise<Extract<Message, { name: Name }>> {
   const response = await pageAccess.request(url, signal ? { signal } : {});
-  const message = unpack(new Uint8Array(await response.arrayBuffer()));
+  const message = unpackServerMessage(new Uint8Array(await response.arrayBuffer()));
   if (message?.name !== name)
     throw new MalformedMessage(
       `Response of ${url} is a message ${message?.name ?? "of unknown type"}, expected ${name}.`,

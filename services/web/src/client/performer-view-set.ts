@@ -1,12 +1,17 @@
 /** Performers of the current motion, and the playback statistics of the first one. */
 
 import type { Figure, Pose } from "../motion/skeleton";
+import type { LiveBuffer } from "../playout/live-buffer";
 import { OverlayBuffer } from "../playout/overlay-buffer";
 import { positionAt } from "../playout/timeline";
 import type { TrackSet } from "../playout/track-set";
+import type { LiveBlock } from "../wire/live";
 import type { TimelineState } from "../wire/messages";
 import { type LimbPredictor, PerformerView } from "./performer-view";
 import type { SolverLoader } from "./solver-loader";
+
+/** Time after which loading the decoder of live poses is attempted again, milliseconds. */
+const LIVE_RETRY_DELAY_MS = 2_000;
 
 /** "starting": no pose yet. "stalled": a block is missing, and the last pose is shown. */
 export type PlaybackState = "starting" | "stalled" | "playing";
@@ -25,6 +30,9 @@ export class PerformerViewSet {
   /** Number of missing blocks while playing. */
   gaps = 0;
   private missingBlock = -1;
+  /** Class that decodes live poses, null until a live performer needed it. */
+  private liveBuffer: typeof LiveBuffer | null = null;
+  private isLoadingLive = false;
 
   /** @param createLoader function that creates the solver loader of a figure */
   constructor(private readonly createLoader: (figure: Figure) => SolverLoader) {}
@@ -54,6 +62,35 @@ export class PerformerViewSet {
   /** Load the missing solvers of the performers shown so far. */
   loadSolvers(): void {
     for (const view of this.all) if (view?.hasPose) view.loadSolver();
+  }
+
+  /**
+   * Add live poses of a performer. Those that arrive before their decoder has been loaded are left out: no message
+   * depends on another.
+   *
+   * @throws DamagedBlock
+   */
+  putLive(performer: number, due: number, frames: number, block: LiveBlock, nowMs: number): void {
+    if (this.liveBuffer) this.all[performer]?.putLive(this.liveBuffer, due, frames, block, nowMs);
+    else void this.loadLive();
+  }
+
+  /** Return the largest of the performers' `liveAgeMs`, or null if nobody is live. */
+  liveAgeMs(nowMs: number): number | null {
+    const ages = this.all.map((view) => view?.liveAgeMs(nowMs) ?? -1);
+    const largest = Math.max(-1, ...ages);
+    return largest < 0 ? null : largest;
+  }
+
+  /** Load the decoder of live poses, unless it is being loaded. */
+  async loadLive(): Promise<void> {
+    if (this.isLoadingLive) return;
+    this.isLoadingLive = true;
+    try {
+      this.liveBuffer = (await import("../playout/live-buffer")).LiveBuffer;
+    } catch {
+      setTimeout(() => (this.isLoadingLive = false), LIVE_RETRY_DELAY_MS);
+    }
   }
 
   /** Return the pose of a performer at presented clock time `clock`, local time `nowMs`: see `Viewer.poseAt`. */

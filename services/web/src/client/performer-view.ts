@@ -3,7 +3,7 @@
 import { applyPlacement, type Placement, type StagedPerformer } from "../motion/placement";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
-import { LiveBuffer } from "../playout/live-buffer";
+import type { LiveBuffer } from "../playout/live-buffer";
 import type { OverlayBuffer } from "../playout/overlay-buffer";
 import type { LiveBlock } from "../wire/live";
 import type { PredictionFrame } from "./predicted-limb";
@@ -63,13 +63,18 @@ export class PerformerView implements StagedPerformer {
   }
 
   /**
-   * Add the live poses of a block of `frames` frames, the last due at `due`.
+   * Add the live poses of a block of `frames` frames, the last due at `due`, that arrived at local `nowMs`.
    *
    * @throws DamagedBlock
    */
-  putLive(due: number, frames: number, block: LiveBlock): void {
-    this.live ??= new LiveBuffer(this.store.track);
-    this.live.put(due, frames, block);
+  putLive(Buffer: typeof LiveBuffer, due: number, frames: number, block: LiveBlock, nowMs: number): void {
+    this.live ??= new Buffer(this.store.track);
+    this.live.put(due, frames, block, nowMs);
+  }
+
+  /** Return the median age of the live poses of the last seconds when they were due, or null if there were none. */
+  liveAgeMs(nowMs: number): number | null {
+    return this.live?.latency.ageMs(nowMs) ?? null;
   }
 
   /** Move to the live pose at presented clock time `clock`. Return false if there is none. */

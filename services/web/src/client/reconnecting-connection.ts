@@ -6,9 +6,9 @@
  */
 
 import { type PlainMessageKey, pageTranslator, type Translator } from "../i18n/translator";
-import { pack, unpack } from "../wire/codec";
+import { packViewerMessage, unpackServerMessage, type ViewerMessage } from "../wire/client-codec";
 import { MalformedMessage } from "../wire/errors";
-import { type ClientMessage, type Message, SUBPROTOCOL } from "../wire/messages";
+import { type Message, SUBPROTOCOL } from "../wire/messages";
 import { ProblemError } from "./problem";
 
 const INITIAL_RETRY_DELAY_MS = 250;
@@ -88,9 +88,9 @@ export class ReconnectingConnection {
   }
 
   /** Send a message. Return false if not connected. */
-  send(message: ClientMessage): boolean {
+  send(message: ViewerMessage): boolean {
     if (!this.socket || !this.isOpen) return false;
-    this.socket.send(pack(message));
+    this.socket.send(packViewerMessage(message));
     this.startSilenceTimer();
     return true;
   }
@@ -197,7 +197,7 @@ export class ReconnectingConnection {
     }
     let message: Message | null;
     try {
-      message = unpack(new Uint8Array(data));
+      message = unpackServerMessage(new Uint8Array(data));
     } catch (error) {
       if (!(error instanceof MalformedMessage)) throw error;
       this.options.onMalformed(error);

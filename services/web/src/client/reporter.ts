@@ -1,6 +1,6 @@
 /** Periodic messages of a viewer: clock pings and reports (`proto/messages.md`, 3.6 and 3.8). */
 
-import type { ClientMessage, Report } from "../wire/messages";
+import type { Ping, Report } from "../wire/messages";
 
 /** Pings of a new connection that are sent at the shorter interval. */
 const INITIAL_PINGS = 8;
@@ -23,7 +23,7 @@ export class ViewerReporter {
    * @param makeReport function that returns the current report
    */
   constructor(
-    private readonly send: (message: ClientMessage) => boolean,
+    private readonly send: (message: Ping | Report) => boolean,
     private readonly now: () => number,
     makeReport: () => Omit<Report, "name">,
   ) {

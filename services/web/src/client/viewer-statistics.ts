@@ -5,7 +5,6 @@ import type { ReferenceClock } from "../playout/clock";
 import type { PlayoutDelay } from "../playout/delay";
 import type { Choice, Report } from "../wire/messages";
 import { BitrateMeter } from "./bitrate-meter";
-import { LiveLatency } from "./live-latency";
 import type { PerformerViewSet } from "./performer-view-set";
 import { describeStatus } from "./viewer-status";
 
@@ -55,7 +54,6 @@ export interface StatisticsSources {
 /** Collector of a viewer's measurements. Durations are moving averages in milliseconds. */
 export class StatisticsCollector {
   readonly bitrate = new BitrateMeter();
-  readonly liveLatency = new LiveLatency();
   /** Number of messages and blocks that could not be decoded. */
   damagedCount = 0;
   /** Last choice of the server. */
@@ -89,7 +87,7 @@ export class StatisticsCollector {
     const { firstPoseMs, level, gaps, state: playback } = performerViews;
     const { damagedCount, choice, closeReason } = this;
     const playoutDelayMs = delay.at(nowMs * 1000) / 1000;
-    const liveAgeMs = this.liveLatency.ageMs(nowMs);
+    const liveAgeMs = performerViews.liveAgeMs(nowMs);
     const isSynchronised = Number.isFinite(clock.errorBound);
     return {
       rate: level < 0 ? -1 : (choice?.rate ?? level),

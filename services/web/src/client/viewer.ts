@@ -340,7 +340,6 @@ export class Viewer extends EventTarget {
     }
     this.motion = message.motion;
     this.performerViews.reset(this.tracks);
-    this.collector.liveLatency.clear();
     this.dispatch("figure");
     this.dispatch("blocks");
   }
@@ -380,13 +379,11 @@ export class Viewer extends EventTarget {
     this.recordArrival(due, frames, now);
     for (const [performer, block] of blocks) {
       try {
-        this.performerViews.all[performer]?.putLive(due, frames, block);
+        this.performerViews.putLive(performer, due, frames, block, now);
       } catch (error) {
         if (!(error instanceof DamagedBlock)) throw error;
         this.collector.damagedCount++;
-        continue;
       }
-      this.collector.liveLatency.add(performer, block.ageUs, now);
     }
   }
 

@@ -106,8 +106,6 @@ export const JAPANESE_PAGE_MESSAGES = {
     "ツールのVMCの送信先を、そのコンピューターのポート{port}にします。送信が始まると舞台に出て、Ctrl-Cで終わります。",
   Copy: "コピー",
   Copied: "コピーしました",
-  "The steps could not be loaded. Check your connection, then try again":
-    "手順を読み込めませんでした。接続を確かめて、もう一度試してください",
   // avatar
   "Dance as": "踊り手",
   "The puppet": "人形",

@@ -5,6 +5,7 @@ import type { MotionTrack } from "../codec/motion-track";
 import { slerp } from "../motion/rotation";
 import { copyPose, JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
 import { LIVE_FRAME_INTERVAL_US, type LiveBlock } from "../wire/live";
+import { LiveLatency } from "./live-latency";
 import { OVERLAY_HOLD_US } from "./overlay-buffer";
 
 /** Capacity of the buffer: four seconds. */
@@ -19,6 +20,8 @@ interface LiveFrame {
 export class LiveBuffer {
   private readonly liveTrack: LiveTrack;
   private readonly frames: LiveFrame[] = [];
+  /** Age of the poses that arrived. */
+  readonly latency = new LiveLatency();
 
   /** @param track motion track of the performer */
   constructor(track: MotionTrack) {
@@ -31,12 +34,14 @@ export class LiveBuffer {
   }
 
   /**
-   * Add the poses of a block of `frames` frames, the last due at `due`. A pose for a time that is held is ignored.
+   * Add the poses of a block of `frames` frames, the last due at `due`, that arrived at local `nowMs`. A pose for a
+   * time that is held is ignored.
    *
    * @throws DamagedBlock
    */
-  put(due: number, frames: number, { data }: LiveBlock): void {
+  put(due: number, frames: number, { ageUs, data }: LiveBlock, nowMs = 0): void {
     const block = this.liveTrack.decode(frames, data);
+    this.latency.add(ageUs, nowMs);
     for (let nth = 0; nth < frames; nth++) {
       const frame = this.insert(due - (frames - 1 - nth) * LIVE_FRAME_INTERVAL_US);
       if (frame) block.poseAt(nth, frame.pose);

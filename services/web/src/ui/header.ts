@@ -5,7 +5,7 @@ import { isolateBidi } from "../i18n/bidi";
 import { formatDecimal } from "../i18n/number-format";
 import { joinList, pageLanguage, translate, translateToParts } from "../i18n/translator";
 import type { Theme } from "../stage/scenery/look";
-import { element, setAttribute, setText } from "./dom";
+import { element, setText } from "./dom";
 import { initialOf } from "./format";
 import { icon } from "./icon";
 import type { Presence } from "./limb-state";
@@ -54,7 +54,7 @@ export function createHeader(
   const renderLive = (names: readonly string[]) => {
     liveBadge.hidden = names.length === 0;
     setText(liveNames, joinList(names.map(isolateBidi)));
-    setAttribute(liveBadge, "title", names.length > 0 ? liveNames.textContent : null);
+    liveBadge.title = liveNames.textContent;
   };
   const count = element("span", { class: "people-count" });
   const avatars = element("span", { class: "avatars" });

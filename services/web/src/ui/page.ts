@@ -6,7 +6,7 @@ import type { AvatarActions } from "./library/avatar-chooser";
 import type { RequestDownload } from "./library/download-menu";
 import { acceptDrops, createLibraryPanel, type LibraryPanel } from "./library/library-panel";
 import type { MotionItem } from "./library/motion-item";
-import type { PerformerActions } from "./library/performer-section";
+import type { CaptureTarget } from "./library/performer-guide";
 import { createLinkPanel, type LinkPanel } from "./link/link-panel";
 import { createLazyMappingDialog } from "./mapping/lazy-mapping-dialog";
 import type { MappingDialog } from "./mapping/mapping-dialog";
@@ -22,11 +22,7 @@ import { createStringsPanel, type StringsActions, type StringsPanel } from "./st
 import type { SoundActions } from "./transport/sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport/transport";
 
-export interface UserActions
-  extends StringsActions,
-    SoundActions,
-    AvatarActions,
-    Omit<PerformerActions, "guideFailed"> {
+export interface UserActions extends StringsActions, SoundActions, AvatarActions {
   share(): void;
   /** Switch to the other language. */
   language(): void;
@@ -46,6 +42,8 @@ export interface UserActions
   remove(motion: MotionItem): void;
   /** Add the motion's performers to those on the stage. Omitted if this page may not. */
   add?(motion: MotionItem): void;
+  /** Return where a capture tool performs. Omitted if this page may not perform. */
+  captureTarget?(): CaptureTarget;
   mapping(mapping: Mapping): void;
   /** Called when a panel opened, closed or changed its size: the stage may need another framing. */
   reframe(): void;
@@ -86,11 +84,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
   const messageArea = createMessageArea(root, noticeElement, () => occupied.invalidate());
   const limbRequests = createLimbRequests(messageArea.element, actions.give);
   const toast = createToast(messageArea.element);
-  const library = createLibraryPanel(root, {
-    ...actions,
-    close: () => panels.close("library"),
-    guideFailed: () => toast(translate("The steps could not be loaded. Check your connection, then try again")),
-  });
+  const library = createLibraryPanel(root, { ...actions, close: () => panels.close("library") });
   const strings = createStringsPanel(root, {
     ...actions,
     close: () => panels.close("strings"),
@@ -112,6 +106,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     (name, open) => {
       transport.setExpanded(name, open);
       if (name === "line" && open) link.load();
+      if (name === "library" && open) library.load();
       strings.dock.hidden = panels.isOpen("strings") || panels.isSheetOpen;
       occupied.invalidate();
       actions.reframe();

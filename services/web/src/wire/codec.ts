@@ -14,7 +14,7 @@ import {
   unpackSample,
 } from "./fixed-message";
 import { packLive, unpackLive } from "./live";
-import { isMapType, packMap, unpackMap } from "./map-message";
+import { CLIENT_MAP_FIELDS, packMap, SERVER_MAP_FIELDS, unpackMap } from "./map-message";
 import { MESSAGE_TYPES, type Message } from "./messages";
 import { MULTI_PERFORMER_OVERLAY_TYPE, packOverlay, unpackOverlay } from "./overlay";
 
@@ -28,6 +28,8 @@ const FIXED_UNPACKERS = new Map<number, (bytes: Uint8Array) => Message>([
   [MESSAGE_TYPES.Input, unpackInput],
   [MESSAGE_TYPES.Sample, unpackSample],
 ]);
+
+const MAP_FIELDS = { ...SERVER_MAP_FIELDS, ...CLIENT_MAP_FIELDS };
 
 /** Encodes a message. */
 export function pack(message: Message): Uint8Array<ArrayBuffer> {
@@ -60,5 +62,5 @@ export function unpack(bytes: Uint8Array): Message | null {
   if (bytes.length === 0) throw new MalformedMessage("message is empty, expected a type byte");
   const fixed = FIXED_UNPACKERS.get(bytes[0]);
   if (fixed) return fixed(bytes);
-  return isMapType(bytes[0]) ? unpackMap(bytes) : null;
+  return unpackMap(bytes, MAP_FIELDS);
 }

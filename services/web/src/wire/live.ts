@@ -33,7 +33,6 @@ const AGE_UNIT_US = 4_000;
 const MAX_AGE = 255;
 
 const LIVE_HEADER_BYTES = 10;
-const MAX_SIZE_BYTES = 2;
 
 export function packLive(message: Live): Uint8Array<ArrayBuffer> {
   const blocks = [...message.blocks].sort(([a], [b]) => a - b);
@@ -59,24 +58,25 @@ export function packLive(message: Live): Uint8Array<ArrayBuffer> {
 
 /** @throws MalformedMessage */
 export function unpackLive(bytes: Uint8Array): Live {
-  if (bytes.length < LIVE_HEADER_BYTES)
-    throw new MalformedMessage(`Live has ${bytes.length} bytes, expected at least ${LIVE_HEADER_BYTES} bytes`);
+  const requireBytes = (end: number) => {
+    if (end > bytes.length)
+      throw new MalformedMessage(`Live has ${bytes.length} bytes, expected at least ${end} bytes`);
+  };
+  requireBytes(LIVE_HEADER_BYTES);
   const blocks = new Map<number, LiveBlock>();
   let at = LIVE_HEADER_BYTES;
   for (let performer = 0; performer < MAX_PERFORMERS; performer++) {
     if (!((bytes[1] >> performer) & 1)) continue;
-    const begin = at + 1;
-    let size = 0;
-    for (let used = 0, byte = 128; byte >= 128; used++) {
-      if (used === MAX_SIZE_BYTES || begin + used >= bytes.length)
-        throw new MalformedMessage("Live ends within its header, or a block's size has more than 2 bytes");
-      byte = bytes[begin + used];
-      size |= (byte & 127) << (7 * used);
-      at = begin + used + 1;
+    requireBytes(at + 2);
+    const ageUs = bytes[at++] * AGE_UNIT_US;
+    let size = bytes[at++];
+    if (size > 127) {
+      requireBytes(at + 1);
+      if (bytes[at] > 127) throw new MalformedMessage("Live has a size of more than 2 bytes");
+      size = (size & 127) | (bytes[at++] << 7);
     }
-    if (at + size > bytes.length)
-      throw new MalformedMessage(`Live has a block of ${size} bytes, of which ${bytes.length - at} are there`);
-    blocks.set(performer, { ageUs: bytes[begin - 1] * AGE_UNIT_US, data: bytes.subarray(at, at + size) });
+    requireBytes(at + size);
+    blocks.set(performer, { ageUs, data: bytes.subarray(at, at + size) });
     at += size;
   }
   if (at !== bytes.length) throw new MalformedMessage(`Live has ${bytes.length - at} bytes after its last block`);

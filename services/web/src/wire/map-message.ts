@@ -3,7 +3,14 @@
 import { decode, encode } from "@msgpack/msgpack";
 import { MalformedMessage } from "./errors";
 import { MAX_LIMBS, MAX_PERFORMERS } from "./limbs";
-import { type LivePresence, MESSAGE_TYPES, type Message, type PuppeteerPresence, type Track } from "./messages";
+import {
+  type LivePresence,
+  MESSAGE_TYPES,
+  type Message,
+  type PuppeteerPresence,
+  type ServerMessage,
+  type Track,
+} from "./messages";
 
 /** Returns a field's value, or throws MalformedMessage with the expected form. */
 type FieldParser = (value: unknown) => unknown;
@@ -76,12 +83,17 @@ const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>
 
 type FieldReader = (value: unknown, before: Readonly<Record<string, unknown>>) => unknown;
 
-/** A parser for every field of every message, in reading order; it gets the fields `before` it. */
-const MESSAGE_FIELDS: {
-  [name in MapMessageName]: {
+/** Parsers of every field of messages, in reading order; a parser gets the fields before its own. */
+type MapFields<Name extends MapMessageName> = {
+  readonly [name in Name]: {
     readonly [field in Exclude<keyof Extract<Message, { name: name }>, "name">]: FieldReader;
   };
-} = {
+};
+
+type ServerMapName = Extract<ServerMessage["name"], MapMessageName>;
+
+/** Fields of the messages that a server sends. */
+export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
   ChannelHeader: { motion: text, now: count, channels: count, software: text, version: count, clock: text },
   Description: { motion: text, first: optional(count), tracks: list(track) },
   TimelineState: {
@@ -104,24 +116,19 @@ const MESSAGE_FIELDS: {
   Welcome: { id: text, colour: count, lead: count },
   Grant: { limb, epoch: count },
   Refusal: { limb, reason: text, holder: optional(text) },
+  Notice: { limb, reason: text, detail: text },
+  Choice: { rate: count, reason: text, line: optional(count) },
+};
+
+/** Fields of the messages that a client sends. */
+export const CLIENT_MAP_FIELDS: MapFields<Exclude<MapMessageName, ServerMapName>> = {
   Edit: { playing: optional(flag), position: optional(count), loop: optional(flag) },
   Report: { buffer: count, decode: count, frame: count, hidden: flag },
   Claim: { limb },
   Release: { limb, epoch: count },
   Alive: { limbs: list(limb) },
-  Notice: { limb, reason: text, detail: text },
-  Choice: { rate: count, reason: text, line: optional(count) },
   Ask: { limb, wanted: flag },
 };
-
-const NAME_BY_TYPE = new Map(
-  Object.keys(MESSAGE_FIELDS).map((name) => [MESSAGE_TYPES[name as MapMessageName], name as MapMessageName]),
-);
-
-/** Returns true if messages of this type byte are a map. */
-export function isMapType(type: number): boolean {
-  return NAME_BY_TYPE.has(type);
-}
 
 /** Encodes a message: the type byte and the map of its fields that are not null. */
 export function packMap(message: Extract<Message, { name: MapMessageName }>): Uint8Array<ArrayBuffer> {
@@ -134,12 +141,16 @@ export function packMap(message: Extract<Message, { name: MapMessageName }>): Ui
 }
 
 /**
- * Decodes a message of a type for which `isMapType` holds.
+ * Decodes one of the messages with these `fields`; null if it is of another type.
  *
  * @throws MalformedMessage
  */
-export function unpackMap(bytes: Uint8Array): Message {
-  const name = NAME_BY_TYPE.get(bytes[0])!;
+export function unpackMap<Name extends MapMessageName>(
+  bytes: Uint8Array,
+  fields: MapFields<Name>,
+): Extract<Message, { name: Name }> | null {
+  const name = (Object.keys(fields) as Name[]).find((one) => MESSAGE_TYPES[one] === bytes[0]);
+  if (name === undefined) return null;
   let values: unknown;
   try {
     values = decode(bytes.subarray(1), {
@@ -153,12 +164,12 @@ export function unpackMap(bytes: Uint8Array): Message {
   }
   if (!isMap(values)) throw new MalformedMessage(`${name} is not a MessagePack map`);
   const message: Record<string, unknown> = { name };
-  for (const [key, field] of Object.entries<FieldReader>(MESSAGE_FIELDS[name])) {
+  for (const [key, field] of Object.entries<FieldReader>(fields[name])) {
     try {
       message[key] = field(values[key], message);
     } catch (error) {
       throw new MalformedMessage(`${name}, ${key}: ${(error as Error).message}`);
     }
   }
-  return message as unknown as Message;
+  return message as unknown as Extract<Message, { name: Name }>;
 }

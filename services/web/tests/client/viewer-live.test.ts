@@ -1,6 +1,6 @@
 /** Live performers of a stream. */
 
-import { describe, expect, test } from "vitest";
+import { describe, expect, test, vi } from "vitest";
 import { LiveTrack } from "../../src/codec/live";
 import { decodeMotionBlock } from "../../src/codec/motion-decoder";
 import { applyPlacement } from "../../src/motion/placement";
@@ -31,11 +31,19 @@ const golden = loadVectors<LiveVectors>("live");
 const PLACE = [2, -1, 0.5];
 const [one, two, , four] = golden.valid.map(({ block }) => decodeBase64(block));
 
-/** Open a viewer of a stored performer and one whose live blocks are the golden ones. */
-function openLiveViewer(motion = "dance"): void {
+/** Open a viewer of a stored performer and one whose live blocks are the golden ones; the decoder of these is loaded. */
+async function openLiveViewer(motion = "dance"): Promise<void> {
   createViewer();
   FakeWebSocket.last.accept();
-  FakeWebSocket.last.receive(header(motion), description(motion), timeline({ motion }));
+  FakeWebSocket.last.receive(header(motion));
+  await loadDecoder();
+  FakeWebSocket.last.receive(description(motion), timeline({ motion }));
+}
+
+/** Send a message for which the viewer loads the decoder; without a description it has no other effect. */
+async function loadDecoder(): Promise<void> {
+  FakeWebSocket.last.receive(live(0, 1, one));
+  await vi.dynamicImportSettled();
 }
 
 function description(motion = "dance"): Message {
@@ -66,8 +74,8 @@ function expectPose(actual: Pose | null, expected: Pose): void {
   expectNear(actual!.rotations, expected.rotations);
 }
 
-test("live pose replaces the stored one at its place, holds, and gives way again", () => {
-  openLiveViewer();
+test("live pose replaces the stored one at its place, holds, and gives way again", async () => {
+  await openLiveViewer();
   FakeWebSocket.last.receive({ name: "Data", track: 1, rate: 1, index: 0, block: best });
   FakeWebSocket.last.receive(live(50_000, 1, one), live(100_000, 2, two));
   expectPose(viewer.poseAt(now, 1), storedPose(0));
@@ -81,8 +89,8 @@ test("live pose replaces the stored one at its place, holds, and gives way again
   expectPose(viewer.poseAt(now, 1), storedPose(12));
 });
 
-test("live performer is shown before its stored blocks, and the first pose counts", () => {
-  openLiveViewer();
+test("live performer is shown before its stored blocks, and the first pose counts", async () => {
+  await openLiveViewer();
   expect(viewer.statistics().reason).toBe("waiting for the first block");
   advanceTime(40);
   FakeWebSocket.last.receive(live(40_000, 4, four, 0), live(40_000, 4, four, 1));
@@ -92,8 +100,24 @@ test("live performer is shown before its stored blocks, and the first pose count
   expect([firstPoseMs, gaps, reason]).toEqual([40, 0, "chosen by the server"]);
 });
 
-test("limb of a live performer is overlaid", () => {
-  openLiveViewer();
+test("messages that arrive before the decoder are left out", async () => {
+  createViewer();
+  FakeWebSocket.last.accept();
+  FakeWebSocket.last.receive(header(), description(), timeline(), live(0, 1, one));
+  expect([viewer.poseAt(now, 1), viewer.damagedCount]).toEqual([null, 0]);
+  await vi.dynamicImportSettled();
+  FakeWebSocket.last.receive(live(0, 1, one));
+  expectPose(viewer.poseAt(now, 1), livePose(1, one, 0));
+});
+
+test("latency is that of the slowest performer", async () => {
+  await openLiveViewer();
+  FakeWebSocket.last.receive(live(0, 1, one, 0, 140_000), live(0, 1, one, 1, 60_000));
+  expect(viewer.statistics().liveLatencyMs).toBe(140);
+});
+
+test("limb of a live performer is overlaid", async () => {
+  await openLiveViewer();
   FakeWebSocket.last.receive(live(0, 1, one));
   const limbs = new Map([[4, Int16Array.of(16_384, 0, 0, 0, 0, 0, 0, 0, 0)]]);
   FakeWebSocket.last.receive({ name: "Overlay", sequence: 0, due: EPOCH_US, limbs, earlier: [] });
@@ -104,8 +128,8 @@ test("limb of a live performer is overlaid", () => {
   expectNear(pose.rotations.subarray(0, 48), expected.rotations.subarray(0, 48));
 });
 
-test("live poses are dropped when the motion changes", () => {
-  openLiveViewer();
+test("live poses are dropped when the motion changes", async () => {
+  await openLiveViewer();
   FakeWebSocket.last.receive(live(0, 1, one));
   expect(viewer.poseAt(now, 1)).not.toBeNull();
   expect(viewer.statistics().liveLatencyMs).toBe(60);
@@ -117,8 +141,8 @@ test("live poses are dropped when the motion changes", () => {
   expectPose(viewer.poseAt(now, 1), livePose(1, one, 0));
 });
 
-test("late live messages delay the presentation as overlays do", () => {
-  openLiveViewer();
+test("late live messages delay the presentation as overlays do", async () => {
+  await openLiveViewer();
   FakeWebSocket.last.receive({ name: "Pong", sequence: 0, sent: 0, received: EPOCH_US, answered: EPOCH_US });
   for (let nth = 0; nth < 150; nth++) {
     // the first of two frames is needed 33 ms before the last is due; both arrive 50 ms late
@@ -132,8 +156,8 @@ test("late live messages delay the presentation as overlays do", () => {
 });
 
 describe("invalid input", () => {
-  test("damaged blocks and messages are skipped and counted, and others of the message are used", () => {
-    openLiveViewer();
+  test("damaged blocks and messages are skipped and counted, and others of the message are used", async () => {
+    await openLiveViewer();
     for (const { frames, block } of golden.invalid) {
       const valid = golden.valid.find((vector) => vector.frames === frames)!;
       const blocks = new Map(
@@ -149,10 +173,10 @@ describe("invalid input", () => {
     expect(viewer.poseAt(now, 0)).not.toBeNull();
   });
 
-  test("performers that are not described are skipped", () => {
+  test("performers that are not described are skipped", async () => {
     createViewer();
     FakeWebSocket.last.accept();
-    FakeWebSocket.last.receive(live(0, 2, two));
+    await loadDecoder();
     FakeWebSocket.last.receive(header(), description(), timeline(), live(0, 2, two, 3), {
       name: "Live",
       due: EPOCH_US,
@@ -163,8 +187,8 @@ describe("invalid input", () => {
   });
 });
 
-test("clock samples and live messages together keep the stage running", () => {
-  openLiveViewer();
+test("clock samples and live messages together keep the stage running", async () => {
+  await openLiveViewer();
   for (let nth = 0; nth < 60; nth++) {
     FakeWebSocket.last.receive(live(now * 1000 + 40_000, 2, two));
     advanceTimeAnswered(100 / 3);

@@ -57,7 +57,7 @@ test("a message that is cut anywhere is refused", () => {
   for (let size = 1; size < bytes.length; size++)
     expect(() => unpackLive(bytes.subarray(0, size))).toThrow(MalformedMessage);
   expect(() => unpackLive(Uint8Array.of(...bytes, 0, 0))).toThrow("Live has 2 bytes after its last block");
-  expect(() => unpackLive(bytes.subarray(0, -1))).toThrow("Live has a block of 20 bytes, of which 19 are there");
+  expect(() => unpackLive(bytes.subarray(0, -1))).toThrow(`expected at least ${bytes.length} bytes`);
   expect(() => unpackLive(bytes.subarray(0, 9))).toThrow("Live has 9 bytes, expected at least 10 bytes");
 });
 

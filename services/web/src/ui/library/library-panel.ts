@@ -12,7 +12,7 @@ import { createPanel, type Panel } from "../panel";
 import { type AvatarActions, type AvatarChooser, createAvatarChooser } from "./avatar-chooser";
 import { createDownloadMenu, type DownloadMenu, type RequestDownload } from "./download-menu";
 import type { MotionItem } from "./motion-item";
-import { createPerformerSection, type PerformerActions } from "./performer-section";
+import type { CaptureTarget } from "./performer-guide";
 
 export interface UploadRow {
   /** Show the bytes sent, of `total`, after `seconds` seconds. */
@@ -31,6 +31,8 @@ export interface DownloadRow {
 export interface LibraryPanel {
   readonly panel: Panel;
   readonly danceAs: AvatarChooser;
+  /** Load the guide for live performers, unless it was loaded before. Call this when the panel opens. */
+  load(): void;
   renderMotions(motions: readonly MotionItem[], current: string | null): void;
   addUpload(name: string, cancel: () => void): UploadRow;
   addDownload(name: string, cancel: () => void): DownloadRow;
@@ -40,13 +42,15 @@ export interface LibraryPanel {
   problem(name: string, title: string, detail: string, hint: string | null): void;
 }
 
-export interface LibraryActions extends AvatarActions, PerformerActions {
+export interface LibraryActions extends AvatarActions {
   files(files: readonly File[]): void;
   choose(id: string): void;
   remove(motion: MotionItem): void;
   /** Add the motion's performers to those on the stage. Omitted if this page may not. */
   add?(motion: MotionItem): void;
   download(motion: MotionItem, ...request: Parameters<RequestDownload>): void;
+  /** Return where a capture tool performs. Omitted if this page may not perform. */
+  captureTarget?(): CaptureTarget;
   close(): void;
 }
 
@@ -78,10 +82,21 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
   let openMenu: string | null = null;
   const menus = new Map<string, DownloadMenu>();
   const danceAs = createAvatarChooser(actions);
-  panel.body.append(drop, picker, transfers, alert, list, empty, danceAs.element, ...createPerformerSection(actions));
+  panel.body.append(drop, picker, transfers, alert, list, empty, danceAs.element);
+  const { captureTarget } = actions;
+  let isGuideRequested = captureTarget === undefined;
   return {
     panel,
     danceAs,
+    load() {
+      if (isGuideRequested) return;
+      isGuideRequested = true;
+      import("./performer-guide").then(
+        ({ createPerformerGuide }) => panel.body.append(createPerformerGuide(captureTarget!)),
+        // the next opening tries again
+        () => (isGuideRequested = false),
+      );
+    },
     renderMotions(motions, current) {
       empty.hidden = motions.length > 0;
       menus.clear();

@@ -1,6 +1,6 @@
-/** Guide for people who perform live: three steps from a motion capture tool to the stage. */
+/** Section of the library for people who perform live: three steps from a motion capture tool to the stage. */
 import { translate, translateToParts } from "../../i18n/translator";
-import { element, setText } from "../dom";
+import { element, setAttribute, setText } from "../dom";
 
 /** Port at which the capture command listens to VMC. */
 const VMC_PORT = 39539;
@@ -9,31 +9,53 @@ const TOKEN_COMMAND = "bunraku token --role ingest";
 
 /** Where a capture tool performs. */
 export interface CaptureTarget {
-  /** Origin of the server. */
-  readonly server: string;
   /** Id of the session on the stage; null for a new one. */
   readonly session: string | null;
   /** True if the server requires a token. */
   readonly needsToken: boolean;
 }
 
-/** Return the command that receives VMC and sends it to `target`. */
-export function captureCommand({ server, session, needsToken }: CaptureTarget): string {
+/** Return the command that receives VMC and sends it to `target` of the server with this origin. */
+export function captureCommand(server: string, { session, needsToken }: CaptureTarget): string {
   const parts = ["bunraku capture vmc", `--server ${server}`];
   if (session !== null) parts.push(`--session ${session}`);
   if (needsToken) parts.push("--token TOKEN");
   return parts.join(" ");
 }
 
+/** Create the section of the library. Its button shows the steps to what `captureTarget` returns then, or hides them. */
+export function createPerformerGuide(captureTarget: () => CaptureTarget): HTMLElement {
+  const steps = element("div", { id: "performer-steps", hidden: true });
+  const toggle = element(
+    "button",
+    { class: "text-button", type: "button", "aria-expanded": "false", "aria-controls": steps.id },
+    translate("Become a performer"),
+  );
+  toggle.addEventListener("click", () => {
+    const isOpening = steps.hidden === true;
+    if (isOpening) steps.replaceChildren(createSteps(captureTarget()));
+    steps.hidden = !isOpening;
+    setAttribute(toggle, "aria-expanded", String(isOpening));
+  });
+  return element(
+    "section",
+    { class: "perform", "aria-labelledby": "perform" },
+    element("h3", { id: "perform" }, translate("Perform live")),
+    element("p", { class: "muted" }, translate("Your own movement, from a motion capture tool, on this stage.")),
+    toggle,
+    steps,
+  );
+}
+
 /** Create the list of steps. */
-export function createPerformerGuide(target: CaptureTarget): HTMLElement {
+function createSteps(target: CaptureTarget): HTMLElement {
   const first = target.needsToken
     ? translateToParts("Ask whoever runs this server for a token that allows performing: {command}", {
         command: element("code", {}, TOKEN_COMMAND),
       })
     : [translate("This server asks for no token. Go to the computer on which your capture tool runs.")];
   const second = translateToParts("Install Bunraku there and start: {command}", {
-    command: createCommand(captureCommand(target)),
+    command: createCommand(captureCommand(location.origin, target)),
   });
   const third = translate(
     "Let your tool send VMC to port {port} of that computer. You are on the stage as soon as it sends; Ctrl-C ends it.",

@@ -15,9 +15,9 @@ from bunraku.playout.performance import pack_sample
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.settings import Settings
-from bunraku.session.cast import Cast, CastMember
-from bunraku.session.cast_store import CastStore
-from bunraku.session.performer_endpoint import (
+from bunraku.session.live.cast import Cast, CastMember
+from bunraku.session.live.cast_store import CastStore
+from bunraku.session.live.performer_endpoint import (
     RECONNECT_TIMEOUT_US,
     REFRESH_INTERVAL_US,
     REPLACED_LIFETIME_US,

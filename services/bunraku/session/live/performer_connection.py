@@ -12,7 +12,7 @@ from typing import Protocol
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.token_bucket import TokenBucket
-from bunraku.session.sample_json import MAX_SAMPLE_BYTES, parse_sample
+from bunraku.session.live.sample_json import MAX_SAMPLE_BYTES, parse_sample
 from bunraku.session.stage_endpoint import PUPPETEER_HEARTBEAT_S
 from bunraku.storage.performance_store import PerformanceHeader, PerformanceStore
 from bunraku.websocket.connection import CLOSED_CONNECTION, FrameLimit, WebSocketConnection

@@ -4,8 +4,8 @@ import pytest
 
 from bunraku.motion.skeleton import standard_figure
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast, CastMember
-from bunraku.session.cast_store import CastStore
+from bunraku.session.live.cast import Cast, CastMember
+from bunraku.session.live.cast_store import CastStore
 from bunraku.storage.motion_store import MotionStore
 
 AIKO, YUKI = (CastMember(f"s-{number}", "", 60.0, None) for number in (1, 2))

@@ -6,7 +6,7 @@ from bunraku.codec.container import StoredMotion, unpack_motion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.motion.placement import Placement
 from bunraku.motion.skeleton import standard_figure
-from bunraku.session.cast import EMPTY_CAST, Cast, CastMember, pack_cast_motion, pack_rest_motion
+from bunraku.session.live.cast import EMPTY_CAST, Cast, CastMember, pack_cast_motion, pack_rest_motion
 from bunraku.wire.messages import Data
 from tests.session.joined_stage import stored_motion
 

@@ -16,8 +16,8 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import clean_text
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import Cast, CastMember
-from bunraku.session.performer_connection import PERFORMER_FRAMES, PerformerConnection
+from bunraku.session.live.cast import Cast, CastMember
+from bunraku.session.live.performer_connection import PERFORMER_FRAMES, PerformerConnection
 from bunraku.session.schema import NewPerformer
 from bunraku.session.session_manager import SessionManager, create_session_id
 from bunraku.session.stage_proxy import StageProxy
@@ -42,8 +42,6 @@ class Performers:
 
         `subject` is that whose number of sessions is limited, None without a limit.
         """
-        if access.is_bound and (new.session is None or new.session != access.session):
-            raise ProblemError(403, "Not allowed", "your link allows performing in its session only", field="session")
         figure = standard_figure() if new.figure is None else new.figure.to_figure()
         if new.session is not None:
             # before anything is stored
@@ -106,8 +104,7 @@ class Performers:
     async def _require(self, performer: str, access: Access) -> PerformanceHeader:
         """Return the header of a performer whom the client may use: its own, or any for an admin."""
         session = session_of(performer)
-        is_reachable = is_subject_token(session) and (not access.is_bound or access.session == session)
-        header = await self._store.get_header(performer) if is_reachable else None
+        header = await self._store.get_header(performer) if is_subject_token(session) else None
         if header is None:
             raise ProblemError(404, "No such performer", f"there is no performer {performer[:40]!r}; it may have ended")
         if header.subject != access.subject and access.role < Role.ADMIN:

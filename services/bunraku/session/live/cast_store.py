@@ -8,7 +8,7 @@ from bunraku.codec.container import StoredMotion
 from bunraku.http.problem_details import motion_not_found
 from bunraku.motion.skeleton import Figure
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import EMPTY_CAST, Cast, CastMember, pack_cast_motion, pack_rest_motion
+from bunraku.session.live.cast import EMPTY_CAST, Cast, CastMember, pack_cast_motion, pack_rest_motion
 from bunraku.storage.motion_store import MotionStore
 
 

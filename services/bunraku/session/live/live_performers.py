@@ -14,7 +14,7 @@ from bunraku.codec.motion_track import MotionTrack
 from bunraku.motion.rotation import Array
 from bunraku.playout.block_store import Pose
 from bunraku.playout.performance import Performance, SampleOutcome, sample_pose
-from bunraku.session.cast import Cast, CastMember
+from bunraku.session.live.cast import Cast, CastMember
 from bunraku.wire.live import Live, LiveBlock, Sample
 
 

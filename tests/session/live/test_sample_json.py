@@ -10,7 +10,7 @@ from bunraku.motion import rotation
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS
 from bunraku.playout.performance import sample_pose
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.sample_json import MAX_SAMPLE_BYTES, parse_sample
+from bunraku.session.live.sample_json import MAX_SAMPLE_BYTES, parse_sample
 from bunraku.wire.live import MAX_ROOT_M, Sample
 
 coordinates = st.floats(-MAX_ROOT_M, MAX_ROOT_M, width=32)

@@ -12,7 +12,7 @@ import pytest
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import JOINT_COUNT, standard_figure
 from bunraku.playout.performance import pack_sample
-from bunraku.session.performer_connection import (
+from bunraku.session.live.performer_connection import (
     MAX_AGE_US,
     MAX_AHEAD_US,
     PERFORMER_FRAMES,

@@ -22,8 +22,8 @@ from bunraku.messaging.performance_request import PERFORMANCE_SUBJECT
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
-from bunraku.session.cast import EMPTY_CAST, Cast, CastMember
-from bunraku.session.cast_store import CastStore
+from bunraku.session.live.cast import EMPTY_CAST, Cast, CastMember
+from bunraku.session.live.cast_store import CastStore
 from bunraku.session.stage import Stage
 from bunraku.wire.live import Sample
 from bunraku.wire.messages import unpack
@@ -111,6 +111,8 @@ class PerformerEndpoint:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        # the editor refers to this object: without the reference both are freed at once
+        del self._editor
 
     def replace(self, cast: Cast) -> None:
         """Remove the motions of a cast that is not shown any more, once nobody asks for them."""

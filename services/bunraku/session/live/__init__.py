@@ -1,0 +1,1 @@
+"""Live performers of stages: casts, connections, and the poses that viewers see."""
