@@ -12,7 +12,8 @@ the viewers decode what they receive. `--parts latency,bitrate` runs some parts,
     output    VMC sent by `bunraku send vmc`, read back by another parser
 
 The time of each pose is found by comparing it with the source, so that the lag includes capture, server, network and
-play-out. The machine must be idle: the goals are those of two cores for everything, the load included.
+play-out. The machine must be idle: the goals are those of two cores for everything, the load included. The figures
+`machine_late_ms_p99_*` show whether it was.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ import argparse
 import asyncio
 import json
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -396,7 +399,29 @@ def geometric_mean(values: list[float]) -> float:
     return round(float(np.exp(np.mean(np.log(values)))), 1)
 
 
+_TIMER = """
+import select, sys, time
+late = []
+while True:
+    due = time.monotonic() + 0.01
+    if select.select([sys.stdin], [], [], 0.01)[0]:
+        break
+    late.append(time.monotonic() - due)
+late.sort()
+print(1e3 * late[int(0.99 * len(late))] if late else 0.0)
+"""
+
+
 def run_part(name: str, bench: Bench) -> Figures:
+    """Run a part, and add how late a timer of another process was: on an idle machine a fraction of a millisecond."""
+    command = [sys.executable, "-c", _TIMER]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as timer:
+        figures = _run_part(name, bench)
+        late_ms, _ = timer.communicate()
+    return {**figures, f"machine_late_ms_p99_{name}": round(float(late_ms), 1)}
+
+
+def _run_part(name: str, bench: Bench) -> Figures:
     """Run a part against a server of its own."""
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         if name != "narrow":

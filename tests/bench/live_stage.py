@@ -189,7 +189,9 @@ def match_poses(source: Source, begin_us: int, times_us: Array, points: Array) -
         best = int(distances.argmin())
         errors.append(1000.0 * distances[best])
         speed = np.linalg.norm(candidates[best] - source.points_at(frames[best] - 1.0), axis=-1).mean() * CAPTURE_FPS
-        if speed > MIN_SPEED_M_S:
+        # poses about a turn of the clip occur twice
+        has_turn = frames[-1] // (len(source.points) - 1) != frames[0] // (len(source.points) - 1)
+        if speed > MIN_SPEED_M_S and not has_turn:
             found.append(lags[best] / 1e3)
     return Match(np.array(found), np.array(errors))
 
