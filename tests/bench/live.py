@@ -83,6 +83,8 @@ KEYS = (
 """Figures of the goals; those of the parts that did not run are null."""
 SETTLE_S = 4.0
 """Time from the first pose after which delays and step sizes have settled."""
+JOIN_S = 1.0
+"""Time from the first live pose in which missing ones are counted apart: the blocks of the motion arrive meanwhile."""
 Figures = dict[str, Any]
 
 
@@ -247,13 +249,15 @@ async def measure_narrow(bench: Bench, server: Server, network: Any) -> Figures:
             received = far.received_bytes
     match = match_shown(source, capture.begin_us, long)
     seconds = (long.live[-1][0] - long.live[0][0]) * 1e-6
+    stalls, joined_us = long.stall_times_us(), long.first_live_us + JOIN_S * 1e6
     return {
         "first_pose_ms_28k8": round(float(np.median(first_ms))),
         "first_pose_worst_ms_28k8": round(max(first_ms)),
         "first_live_pose_ms_28k8": round(float(np.median(first_live_ms))),
         "lag_ms_p50_28k8": percentile(match.lags_ms, 50),
         "lag_ms_p95_28k8": percentile(match.lags_ms, 95),
-        "stalls_28k8": long.stalls + long.statistics.gaps,
+        "stalls_28k8": sum(at > joined_us for at in stalls) + long.statistics.gaps,
+        "stalls_at_join_28k8": sum(at <= joined_us for at in stalls),
         "narrow_messages_per_s": round(len(long.live) / seconds, 1),
         "narrow_error_mm": round(float(np.mean(match.errors_mm)), 2),
         "narrow_link_used": round(received * 8 / 28_800 / (long.statistics.seconds or 1.0), 2),

@@ -144,11 +144,9 @@ class RecordingViewer(Viewer):
         """Time of the first picture with a live pose; 0 without one."""
         return next((at for at, _, is_live in self.shown if is_live), 0)
 
-    @property
-    def stalls(self) -> int:
-        """Number of times that the live pose was missing after the first one."""
-        live = [is_live for _, _, is_live in self.shown]
-        return sum(before and not after for before, after in pairwise(live))
+    def stall_times_us(self) -> list[int]:
+        """Return the times, after the first live pose, at which the live pose was missing again."""
+        return [at for (_, _, before), (at, _, after) in pairwise(self.shown) if before and not after]
 
     def points(self, performer: int = 0) -> tuple[Array, Array]:
         """Return the due times (n,) and positions (n, 23, 3) of all live frames, in order."""
