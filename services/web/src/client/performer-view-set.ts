@@ -1,11 +1,11 @@
 /** Performers of the current motion, and the playback statistics of the first one. */
 
 import type { Figure, Pose } from "../motion/skeleton";
-import type { LiveBuffer } from "../playout/live-buffer";
+import type { LivePoses } from "../playout/live-poses";
 import { OverlayBuffer } from "../playout/overlay-buffer";
 import { positionAt } from "../playout/timeline";
 import type { TrackSet } from "../playout/track-set";
-import type { LiveBlock } from "../wire/live";
+import type { Live } from "../wire/live";
 import type { TimelineState } from "../wire/messages";
 import { type LimbPredictor, PerformerView } from "./performer-view";
 import type { SolverLoader } from "./solver-loader";
@@ -30,9 +30,10 @@ export class PerformerViewSet {
   /** Number of missing blocks while playing. */
   gaps = 0;
   private missingBlock = -1;
-  /** Class that decodes live poses, null until a live performer needed it. */
-  private liveBuffer: typeof LiveBuffer | null = null;
+  /** Live poses, null until a live performer needed their decoder. */
+  live: LivePoses | null = null;
   private isLoadingLive = false;
+  private stores: TrackSet["performers"] = [];
 
   /** @param createLoader function that creates the solver loader of a figure */
   constructor(private readonly createLoader: (figure: Figure) => SolverLoader) {}
@@ -48,6 +49,8 @@ export class PerformerViewSet {
     this.overlays.clear();
     this.missingBlock = this.level = -1;
     this.all = [];
+    this.stores = tracks.performers;
+    this.live?.reset(this.stores);
     this.add(tracks);
   }
 
@@ -65,39 +68,20 @@ export class PerformerViewSet {
   }
 
   /**
-   * Add live poses of a performer. Those that arrive before their decoder has been loaded are left out: no message
-   * depends on another.
-   *
-   * @throws DamagedBlock
+   * Add live poses that arrived at local `nowMs`; return the number of damaged blocks. Messages that arrive before their
+   * decoder has been loaded are left out: none depends on another.
    */
-  putLive(performer: number, due: number, frames: number, block: LiveBlock, nowMs: number): void {
-    if (this.liveBuffer) this.all[performer]?.putLive(this.liveBuffer, due, frames, block, nowMs);
-    else void this.loadLive();
-  }
-
-  /** Return the largest of the performers' `liveAgeMs`, or null if nobody is live. */
-  liveAgeMs(nowMs: number): number | null {
-    const ages = this.all.map((view) => view?.liveAgeMs(nowMs) ?? -1);
-    const largest = Math.max(-1, ...ages);
-    return largest < 0 ? null : largest;
-  }
-
-  /** Load the decoder of live poses, unless it is being loaded. */
-  async loadLive(): Promise<void> {
-    if (this.isLoadingLive) return;
-    this.isLoadingLive = true;
-    try {
-      this.liveBuffer = (await import("../playout/live-buffer")).LiveBuffer;
-    } catch {
-      setTimeout(() => (this.isLoadingLive = false), LIVE_RETRY_DELAY_MS);
-    }
+  putLive(message: Live, nowMs: number): number {
+    if (this.live) return this.live.put(message, nowMs);
+    if (message.blocks.size > 0) void this.loadLive();
+    return 0;
   }
 
   /** Return the pose of a performer at presented clock time `clock`, local time `nowMs`: see `Viewer.poseAt`. */
   poseAt(performer: number, timeline: TimelineState, clock: number, nowMs: number): Pose | null {
     const view = this.all[performer];
     if (!view) return null;
-    if (view.seekLive(clock)) {
+    if (this.live && view.seekLive(this.live, clock)) {
       if (performer === 0) this.onPoseShown(nowMs);
     } else {
       const position = positionAt(timeline, clock);
@@ -109,6 +93,17 @@ export class PerformerViewSet {
       }
     }
     return view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
+  }
+
+  private async loadLive(): Promise<void> {
+    if (this.isLoadingLive) return;
+    this.isLoadingLive = true;
+    try {
+      const { LivePoses } = await import("../playout/live-poses");
+      this.live = new LivePoses(this.stores);
+    } catch {
+      setTimeout(() => (this.isLoadingLive = false), LIVE_RETRY_DELAY_MS);
+    }
   }
 
   private onPoseShown(nowMs: number): void {

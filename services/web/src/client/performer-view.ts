@@ -3,9 +3,8 @@
 import { applyPlacement, type Placement, type StagedPerformer } from "../motion/placement";
 import { copyPose, type Figure, type Pose, restPose } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
-import type { LiveBuffer } from "../playout/live-buffer";
+import type { LivePoses } from "../playout/live-poses";
 import type { OverlayBuffer } from "../playout/overlay-buffer";
-import type { LiveBlock } from "../wire/live";
 import type { PredictionFrame } from "./predicted-limb";
 import type { SolverLoader } from "./solver-loader";
 
@@ -31,8 +30,6 @@ export class PerformerView implements StagedPerformer {
   hasPose = false;
   private readonly motionPose = restPose();
   private readonly mergedPose = restPose();
-  /** Live poses, null before the first. */
-  private live: LiveBuffer | null = null;
 
   /**
    * @param number number of the performer
@@ -62,24 +59,9 @@ export class PerformerView implements StagedPerformer {
     this.solverLoader.load();
   }
 
-  /**
-   * Add the live poses of a block of `frames` frames, the last due at `due`, that arrived at local `nowMs`.
-   *
-   * @throws DamagedBlock
-   */
-  putLive(Buffer: typeof LiveBuffer, due: number, frames: number, block: LiveBlock, nowMs: number): void {
-    this.live ??= new Buffer(this.store.track);
-    this.live.put(due, frames, block, nowMs);
-  }
-
-  /** Return the median age of the live poses of the last seconds when they were due, or null if there were none. */
-  liveAgeMs(nowMs: number): number | null {
-    return this.live?.latency.ageMs(nowMs) ?? null;
-  }
-
   /** Move to the live pose at presented clock time `clock`. Return false if there is none. */
-  seekLive(clock: number): boolean {
-    if (!this.live?.poseAt(clock, this.motionPose)) return false;
+  seekLive(live: LivePoses, clock: number): boolean {
+    if (!live.poseAt(this.number, clock, this.motionPose)) return false;
     if (!this.hasPose) this.loadSolver();
     return (this.hasPose = true);
   }

@@ -87,7 +87,7 @@ export class StatisticsCollector {
     const { firstPoseMs, level, gaps, state: playback } = performerViews;
     const { damagedCount, choice, closeReason } = this;
     const playoutDelayMs = delay.at(nowMs * 1000) / 1000;
-    const liveAgeMs = performerViews.liveAgeMs(nowMs);
+    const liveAgeMs = performerViews.live?.ageMs(nowMs) ?? null;
     const isSynchronised = Number.isFinite(clock.errorBound);
     return {
       rate: level < 0 ? -1 : (choice?.rate ?? level),

@@ -375,16 +375,9 @@ export class Viewer extends EventTarget {
     this.recordArrival(message.due, message.earlier.length + 1, now);
   }
 
-  private onLive({ due, frames, blocks }: Live, now: number): void {
-    this.recordArrival(due, frames, now);
-    for (const [performer, block] of blocks) {
-      try {
-        this.performerViews.putLive(performer, due, frames, block, now);
-      } catch (error) {
-        if (!(error instanceof DamagedBlock)) throw error;
-        this.collector.damagedCount++;
-      }
-    }
+  private onLive(message: Live, now: number): void {
+    this.recordArrival(message.due, message.frames, now);
+    this.collector.damagedCount += this.performerViews.putLive(message, now);
   }
 
   /** Adapt the play-out delay to a message of `frames` frames, the last due at clock time `due`. */

@@ -3,7 +3,7 @@
  */
 import { isolateBidi } from "../i18n/bidi";
 import { formatDecimal } from "../i18n/number-format";
-import { joinList, pageLanguage, translate, translateToParts } from "../i18n/translator";
+import { joinList, pageLanguage, translate } from "../i18n/translator";
 import type { Theme } from "../stage/scenery/look";
 import { element, setText } from "./dom";
 import { initialOf } from "./format";
@@ -43,19 +43,8 @@ export function createHeader(
       motionName,
     ),
   );
-  const liveNames = element("span", { dir: "auto" });
-  const liveBadge = element(
-    "span",
-    { class: "live", hidden: true },
-    ...translateToParts("Live {names}", { names: liveNames }),
-  );
   // present from the start, so that screen readers announce its changes
-  const live = element("div", { class: "live-status", role: "status" }, liveBadge);
-  const renderLive = (names: readonly string[]) => {
-    liveBadge.hidden = names.length === 0;
-    setText(liveNames, joinList(names.map(isolateBidi)));
-    liveBadge.title = liveNames.textContent;
-  };
+  const live = element("div", { class: "live", role: "status" });
   const count = element("span", { class: "people-count" });
   const avatars = element("span", { class: "avatars" });
   const people = element("div", { class: "people", role: "group", hidden: true }, count, avatars);
@@ -90,16 +79,19 @@ export function createHeader(
   );
   const theme = element("button", { class: "round-button", type: "button", onClick: actions.theme }, icon("theme"));
   const right = element("div", { class: "header-right" }, people, share, keys, language, theme);
-  const left = element("div", { class: "header-left" }, brand, live);
-  root.append(element("header", { class: "header" }, left, right));
+  root.append(element("header", { class: "header" }, element("div", { class: "header-left" }, brand, live), right));
   return {
-    parts: [brand, liveBadge, right],
+    parts: [brand, live, right],
     setMotionName(name) {
       setText(motionName, name);
       document.title = name ? `${isolateBidi(name)} - Bunraku` : "Bunraku";
     },
     renderPeople(presence, self) {
-      renderLive(presence?.live?.map(({ name }) => name) ?? []);
+      const performers = presence?.live ?? [];
+      setText(
+        live,
+        performers[0] ? translate("Live {names}", { names: joinList(performers.map(({ name }) => name)) }) : "",
+      );
       people.hidden = !presence || (presence.viewers < 1 && presence.puppeteers.length === 0);
       if (!presence) return;
       const viewers = Math.max(presence.viewers, presence.puppeteers.length);
