@@ -12,7 +12,8 @@ the viewers decode what they receive. `--parts latency,bitrate` runs some parts,
     output    VMC sent by `bunraku send vmc`, read back by another parser
 
 The time of each pose is found by comparing it with the source, so that the lag includes capture, server, network and
-play-out. The machine must be idle: the goals are those of two cores for everything, the load included.
+play-out. The machine must be idle: the goals are those of two cores for everything, the load included. The figures
+`machine_late_ms_p99_*` show whether it was.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ import argparse
 import asyncio
 import json
 import os
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Awaitable, Callable
@@ -30,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from bunraku.client import Client, Puppeteer
+from bunraku.client import Client, Performer, Puppeteer
 from bunraku.client.datagram import DatagramSender
 from bunraku.client.stage_output import VmcOutput
 from bunraku.codec import live as live_codec
@@ -39,6 +42,7 @@ from bunraku.motion.rotation import Array
 from bunraku.playout.block_store import Pose
 from bunraku.serve import WARM_UP_DELAY_S
 from tests.bench.fanout_processes import LineProcess
+from tests.bench.live_sender import bounce
 from tests.bench.live_stage import (
     CAPTURE_FPS,
     PACKET_HEADER_BYTES,
@@ -79,6 +83,8 @@ KEYS = (
 """Figures of the goals; those of the parts that did not run are null."""
 SETTLE_S = 4.0
 """Time from the first pose after which delays and step sizes have settled."""
+JOIN_S = 1.0
+"""Time from the first live pose in which missing ones are counted apart: the blocks of the motion arrive meanwhile."""
 Figures = dict[str, Any]
 
 
@@ -243,13 +249,15 @@ async def measure_narrow(bench: Bench, server: Server, network: Any) -> Figures:
             received = far.received_bytes
     match = match_shown(source, capture.begin_us, long)
     seconds = (long.live[-1][0] - long.live[0][0]) * 1e-6
+    stalls, joined_us = long.stall_times_us(), long.first_live_us + JOIN_S * 1e6
     return {
         "first_pose_ms_28k8": round(float(np.median(first_ms))),
         "first_pose_worst_ms_28k8": round(max(first_ms)),
         "first_live_pose_ms_28k8": round(float(np.median(first_live_ms))),
         "lag_ms_p50_28k8": percentile(match.lags_ms, 50),
         "lag_ms_p95_28k8": percentile(match.lags_ms, 95),
-        "stalls_28k8": long.stalls + long.statistics.gaps,
+        "stalls_28k8": sum(at > joined_us for at in stalls) + long.statistics.gaps,
+        "stalls_at_join_28k8": sum(at <= joined_us for at in stalls),
         "narrow_messages_per_s": round(len(long.live) / seconds, 1),
         "narrow_error_mm": round(float(np.mean(match.errors_mm)), 2),
         "narrow_link_used": round(received * 8 / 28_800 / (long.statistics.seconds or 1.0), 2),
@@ -273,6 +281,7 @@ async def measure_faults(bench: Bench, server: Server) -> Figures:
         "loss_accel_ratio_p99": round(ratio, 2),
         "clean_accel_m_s2_p99": percentile(clean, 99),
         "faulty_accel_m_s2_p99": percentile(faulty, 99),
+        "clean_accel_m_s2_max": round(float(clean.max()), 1),
         "faulty_accel_m_s2_max": round(float(faulty.max()), 1),
         "faulty_missing": captures[1].statistics["missing"],
         "faulty_late": captures[1].statistics["late"],
@@ -292,13 +301,17 @@ def joint_accelerations(viewer: RecordingViewer) -> Array:
 
 
 async def measure_fanout(bench: Bench, server: Server) -> Figures:
-    """Measure the part fanout."""
+    """Measure the part fanout. The performers are in this process: capture tools would take time from the server."""
     sources = [bench.source(name) for name in ("mass_dance", "perfume_A", "mass_walk", "cmu_12_01_walk")]
     async with AsyncExitStack() as stack:
-        first = await stack.enter_async_context(run_capture_process(server.url, sources[0]))
-        for source in sources[1:]:
-            await stack.enter_async_context(run_capture_process(server.url, source, "--session", first.session))
-        url = Client(server.url).socket_url(f"/v1/sessions/{first.session}/stream?tracks=motion")
+        client = await stack.enter_async_context(Client(server.url))
+        session = None
+        for source in sources:
+            performer = await stack.enter_async_context(client.perform(source.figure, session=session))
+            session = performer.session
+            sending = asyncio.create_task(_send_poses(source, performer))
+            stack.callback(sending.cancel)
+        url = client.socket_url(f"/v1/sessions/{session}/stream?tracks=motion")
         crowd = stack.enter_context(LineProcess.start_module("fanout_crowd", url, "talk"))
 
         async def command(line: str) -> dict[str, Any]:
@@ -311,17 +324,28 @@ async def measure_fanout(bench: Bench, server: Server) -> Figures:
         await command("count")
         before, begun = cpu_seconds(server.pid), time.monotonic()
         await asyncio.sleep(bench.seconds / 2)
-        cores = (cpu_seconds(server.pid) - before) / (time.monotonic() - begun)
+        passed = time.monotonic() - begun
+        cores = (cpu_seconds(server.pid) - before) / passed
         figures = await command("figures")
     return {
         "cores_4x500": round(cores, 2),
         "gap_ms_p99_4x500": figures["live_gap_ms_p99"],
         "late_ms_p99_4x500": figures["live_late_ms_p99"],
-        "live_messages_4x500": figures["live_messages"],
+        "live_messages_per_s_4x500": round(figures["live_messages"] / figures["seconds"] / joined["joined"], 1),
         "viewers_4x500": joined["joined"],
         "dropped_4x500": figures["dropped"],
         "kbps_4x500": round(figures["bytes_per_second"] * 8e-3, 1),
     }
+
+
+async def _send_poses(source: Source, performer: Performer) -> None:
+    """Send the poses of a source at 60 frames per second."""
+    begin_s, number = time.monotonic(), 0
+    while True:
+        at_s, frame = begin_s + number / CAPTURE_FPS, bounce(number, len(source.roots))
+        await asyncio.sleep(max(at_s - time.monotonic(), 0.0))
+        await performer.frame((source.roots[frame], source.rotations[frame]), at_s)
+        number += 1
 
 
 async def measure_output(bench: Bench, server: Server) -> Figures:
@@ -379,7 +403,29 @@ def geometric_mean(values: list[float]) -> float:
     return round(float(np.exp(np.mean(np.log(values)))), 1)
 
 
+_TIMER = """
+import select, sys, time
+late = []
+while True:
+    due = time.monotonic() + 0.01
+    if select.select([sys.stdin], [], [], 0.01)[0]:
+        break
+    late.append(time.monotonic() - due)
+late.sort()
+print(1e3 * late[int(0.99 * len(late))] if late else 0.0)
+"""
+
+
 def run_part(name: str, bench: Bench) -> Figures:
+    """Run a part, and add how late a timer of another process was: on an idle machine a fraction of a millisecond."""
+    command = [sys.executable, "-c", _TIMER]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as timer:
+        figures = _run_part(name, bench)
+        late_ms, _ = timer.communicate()
+    return {**figures, f"machine_late_ms_p99_{name}": round(float(late_ms), 1)}
+
+
+def _run_part(name: str, bench: Bench) -> Figures:
     """Run a part against a server of its own."""
     with tempfile.TemporaryDirectory(prefix="bunraku-bench-") as folder:
         if name != "narrow":

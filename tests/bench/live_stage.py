@@ -144,11 +144,9 @@ class RecordingViewer(Viewer):
         """Time of the first picture with a live pose; 0 without one."""
         return next((at for at, _, is_live in self.shown if is_live), 0)
 
-    @property
-    def stalls(self) -> int:
-        """Number of times that the live pose was missing after the first one."""
-        live = [is_live for _, _, is_live in self.shown]
-        return sum(before and not after for before, after in pairwise(live))
+    def stall_times_us(self) -> list[int]:
+        """Return the times, after the first live pose, at which the live pose was missing again."""
+        return [at for (_, _, before), (at, _, after) in pairwise(self.shown) if before and not after]
 
     def points(self, performer: int = 0) -> tuple[Array, Array]:
         """Return the due times (n,) and positions (n, 23, 3) of all live frames, in order."""
@@ -189,7 +187,9 @@ def match_poses(source: Source, begin_us: int, times_us: Array, points: Array) -
         best = int(distances.argmin())
         errors.append(1000.0 * distances[best])
         speed = np.linalg.norm(candidates[best] - source.points_at(frames[best] - 1.0), axis=-1).mean() * CAPTURE_FPS
-        if speed > MIN_SPEED_M_S:
+        # poses about a turn of the clip occur twice
+        has_turn = frames[-1] // (len(source.points) - 1) != frames[0] // (len(source.points) - 1)
+        if speed > MIN_SPEED_M_S and not has_turn:
             found.append(lags[best] / 1e3)
     return Match(np.array(found), np.array(errors))
 

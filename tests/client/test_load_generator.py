@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 import resource
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import pytest
 
 from bunraku.client import Client
 from bunraku.client.load_generator import FileLimitExceeded, LoadGenerator, run_load
+from tests.e2e.test_live import sending
+from tests.time_limit import HANG_TIMEOUT_S
 
 
 async def test_all_of_them_are_sent_the_dance(server: str, clip_file: Path) -> None:
@@ -42,6 +45,22 @@ async def test_blocks_are_counted_once_each_and_are_in_time(server: str, clip_fi
     # but for the first of each, which has begun when one comes
     assert blocks == sum(held) - 4
     assert stalls == 0
+
+
+async def test_live_messages_and_the_gaps_between_them_are_counted(server: str) -> None:
+    async with Client(server) as client, client.perform() as performer, sending(performer):
+        crowd = LoadGenerator(client.socket_url(f"/v1/sessions/{performer.session}/stream"))
+        await crowd.join(2)
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while len(crowd.state.live_gaps) < 20:  # noqa: ASYNC110
+                await asyncio.sleep(0.01)
+        figures = crowd.statistics()
+        await crowd.close()
+    # the first message of each viewer has none before it
+    assert figures.live_messages == len(crowd.state.live_gaps) + 2
+    assert figures.live_gap_ms_p99 is not None
+    assert figures.live_gap_ms_p99 > 0
+    assert figures.overlays == 0
 
 
 async def test_what_is_refused_is_counted_and_said(server: str) -> None:
