@@ -5,8 +5,7 @@ from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.live import LiveEncoder, LiveTrack
 from bunraku.codec.motion_track import plan_motion_track
 from bunraku.motion import rotation
-from bunraku.playout.live_buffer import MAX_FRAMES, LiveBuffer
-from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US
+from bunraku.playout.live_buffer import LIVE_HOLD_US, MAX_FRAMES, LiveBuffer
 from bunraku.wire.live import Live
 from tests.codec.test_live import make_motion
 
@@ -65,12 +64,12 @@ def test_pose_holds_for_a_while_and_then_ends() -> None:
     buffer = filled([0])
     last = BEGIN + FRAME_US
     assert buffer.pose_at(BEGIN - 1) is None
-    assert buffer.pose_at(last + OVERLAY_HOLD_US) is not None
-    assert buffer.pose_at(last + OVERLAY_HOLD_US + 1) is None
+    assert buffer.pose_at(last + LIVE_HOLD_US) is not None
+    assert buffer.pose_at(last + LIVE_HOLD_US + 1) is None
     # after a gap, the next pose takes effect when it is due
     late = filled([0, 19])
     np.testing.assert_array_equal(
-        late.pose_at(last + OVERLAY_HOLD_US - 1)[0],  # type: ignore[index]
+        late.pose_at(last + LIVE_HOLD_US - 1)[0],  # type: ignore[index]
         late.pose_at(last)[0],  # type: ignore[index]
     )
 

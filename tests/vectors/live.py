@@ -25,9 +25,9 @@ FRAME_US = Live.FRAME_INTERVAL_US
 STEP = 148
 SHOWN_FRAMES = (
     *(-0.5, 0.0, 0.25, 1.0, 2.5, 3.0, 4.1, 5.0, 6.5, 7.75, 9.0, 10.2, 12.6, 13.0),
-    *(20.0, 23.5, 24.5, 27.5, 30.0, 40.0, 40.75, 41.0, 45.0, 60.0),
+    *(20.0, 38.5, 39.5, 42.5, 45.0, 70.0, 70.75, 71.0, 90.0, 110.0),
 )
-"""Frames and instants between them; before the first, within the hold of 250 ms (15 frames), and after it."""
+"""Frames and instants between them; before the first, within the hold of 500 ms (30 frames), and after it."""
 
 
 def make_live_track(dancer: bytes) -> LiveTrack:
@@ -116,10 +116,10 @@ def _messages(random: np.random.Generator) -> list[Live]:
         # the same instants once more: the first poses stay
         live(9, 2, 0),
         live(13, 4, 1),
-        # more than 250 ms later
-        live(40, 1, 0),
-        live(41, 1, 0),
-        Live(NOW_US + 43 * FRAME_US, 2, {}),
+        # more than 500 ms later
+        live(70, 1, 0),
+        live(71, 1, 0),
+        Live(NOW_US + 73 * FRAME_US, 2, {}),
     ]
 
 

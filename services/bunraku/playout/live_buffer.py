@@ -9,9 +9,11 @@ import numpy as np
 from bunraku.codec.live import LiveTrack
 from bunraku.motion import rotation
 from bunraku.playout.block_store import Pose
-from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US
 from bunraku.wire.live import Live
 
+LIVE_HOLD_US = 500_000
+"""Longest gap between messages that is bridged, and time for which the last pose is held: on a constrained link, blocks
+of the stored motion delay the first messages by 0.4 s."""
 MAX_FRAMES = 256
 
 
@@ -41,10 +43,10 @@ class LiveBuffer:
     def pose_at(self, clock: float) -> Pose | None:
         """Return the pose at `clock`; None before the first one, and after the last one has held."""
         after = bisect_right(self._due_times, clock)
-        if after == 0 or clock - self._due_times[after - 1] > OVERLAY_HOLD_US:
+        if after == 0 or clock - self._due_times[after - 1] > LIVE_HOLD_US:
             return None
         before, pose = self._due_times[after - 1], self._poses[after - 1]
-        if after == len(self._due_times) or self._due_times[after] - before > OVERLAY_HOLD_US:
+        if after == len(self._due_times) or self._due_times[after] - before > LIVE_HOLD_US:
             # after a gap a pose takes effect when it is due
             return pose
         mix = (clock - before) / (self._due_times[after] - before)

@@ -6,8 +6,12 @@ import { slerp } from "../motion/rotation";
 import { copyPose, JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
 import { LIVE_FRAME_INTERVAL_US, type LiveBlock } from "../wire/live";
 import { LiveLatency } from "./live-latency";
-import { OVERLAY_HOLD_US } from "./overlay-buffer";
 
+/**
+ * Longest gap between messages that is bridged, and time for which the last pose is held, microseconds: on a constrained
+ * link, blocks of the stored motion delay the first messages by 0.4 s.
+ */
+export const LIVE_HOLD_US = 500_000;
 /** Capacity of the buffer: four seconds. */
 export const MAX_FRAMES = 256;
 
@@ -56,11 +60,11 @@ export class LiveBuffer {
     const { frames } = this;
     let at = frames.length;
     while (at > 0 && frames[at - 1].due > clock) at--;
-    if (at === 0 || clock - frames[at - 1].due > OVERLAY_HOLD_US) return false;
+    if (at === 0 || clock - frames[at - 1].due > LIVE_HOLD_US) return false;
     const before = frames[at - 1];
     copyPose(before.pose, out);
     // after a gap a pose takes effect when it is due
-    if (at === frames.length || frames[at].due - before.due > OVERLAY_HOLD_US) return true;
+    if (at === frames.length || frames[at].due - before.due > LIVE_HOLD_US) return true;
     const { due, pose: next } = frames[at];
     const mix = (clock - before.due) / (due - before.due);
     for (let axis = 0; axis < 3; axis++) out.root[axis] += mix * (next.root[axis] - out.root[axis]);

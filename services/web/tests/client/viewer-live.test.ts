@@ -83,10 +83,10 @@ test("live pose replaces the stored one at its place, holds, and gives way again
   expectPose(viewer.poseAt(now, 1), livePose(1, one, 0));
   advanceTime(50);
   expectPose(viewer.poseAt(now, 1), livePose(2, two, 1));
-  advanceTime(250);
+  advanceTime(500);
   expectPose(viewer.poseAt(now, 1), livePose(2, two, 1));
-  advanceTime(50);
-  expectPose(viewer.poseAt(now, 1), storedPose(12));
+  advanceTime(100);
+  expectPose(viewer.poseAt(now, 1), storedPose(21));
 });
 
 test("live performer is shown before its stored blocks, and the first pose counts", async () => {

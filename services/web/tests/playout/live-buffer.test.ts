@@ -3,8 +3,7 @@ import { expect, test } from "vitest";
 import { DamagedBlock } from "../../src/codec/errors";
 import { applyPlacement } from "../../src/motion/placement";
 import { restPose } from "../../src/motion/skeleton";
-import { LiveBuffer, MAX_FRAMES } from "../../src/playout/live-buffer";
-import { OVERLAY_HOLD_US } from "../../src/playout/overlay-buffer";
+import { LIVE_HOLD_US, LiveBuffer, MAX_FRAMES } from "../../src/playout/live-buffer";
 import { TrackSet } from "../../src/playout/track-set";
 import { unpack } from "../../src/wire/codec";
 import { LIVE_FRAME_INTERVAL_US, type Live } from "../../src/wire/live";
@@ -53,20 +52,20 @@ test("messages of the vectors give the recorded poses on the stage", () => {
 test("pose holds for a while, then there is none, and the output stays as it was", () => {
   const live = buffer([BEGIN, 1, one]);
   expect(poseAt(live, BEGIN - 1)).toBeNull();
-  expect(poseAt(live, BEGIN + OVERLAY_HOLD_US)).toEqual(poseAt(live, BEGIN));
-  expect(poseAt(live, BEGIN + OVERLAY_HOLD_US + 1)).toBeNull();
+  expect(poseAt(live, BEGIN + LIVE_HOLD_US)).toEqual(poseAt(live, BEGIN));
+  expect(poseAt(live, BEGIN + LIVE_HOLD_US + 1)).toBeNull();
   const pose = restPose();
   expect(live.poseAt(BEGIN - 1, pose)).toBe(false);
   expect(pose).toEqual(restPose());
 });
 
 test("after a gap a pose takes effect when it is due", () => {
-  const live = buffer([BEGIN, 1, one], [BEGIN + OVERLAY_HOLD_US + 100, 2, two]);
-  const first = BEGIN + OVERLAY_HOLD_US + 100 - LIVE_FRAME_INTERVAL_US;
+  const live = buffer([BEGIN, 1, one], [BEGIN + LIVE_HOLD_US + 100, 2, two]);
+  const first = BEGIN + LIVE_HOLD_US + 100 - LIVE_FRAME_INTERVAL_US;
   // the first frame of the two is within the hold of the pose before, and interpolated
   expect(poseAt(live, first - 1)).not.toEqual(poseAt(live, BEGIN));
-  const far = buffer([BEGIN, 1, one], [BEGIN + 2 * OVERLAY_HOLD_US, 1, one]);
-  expect(poseAt(far, BEGIN + OVERLAY_HOLD_US)).toEqual(poseAt(far, BEGIN));
+  const far = buffer([BEGIN, 1, one], [BEGIN + 2 * LIVE_HOLD_US, 1, one]);
+  expect(poseAt(far, BEGIN + LIVE_HOLD_US)).toEqual(poseAt(far, BEGIN));
 });
 
 test("order and repetition of messages do not matter", () => {
