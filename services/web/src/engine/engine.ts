@@ -130,7 +130,7 @@ export class Engine {
 
   /** Handle a message of the page. */
   handle(command: EngineCommand): void {
-    const { commands, pointer, stage, velocity } = this.#controller ?? {};
+    const { body, commands, pointer, stage, velocity } = this.#controller ?? {};
     switch (command.type) {
       case "set":
         Object.assign(this.#settings, command.settings);
@@ -165,8 +165,12 @@ export class Engine {
         // A page in the background draws no frames, so nothing else would release the inputs that were pressed.
         if (this.#settings.isHidden) velocity?.update(performance.now());
         break;
+      case "body":
+        body?.handle(command.hands, this.#toLocal(command.now));
+        break;
       case "release limbs":
         velocity?.releaseAll();
+        body?.releaseAll();
         break;
       case "limb":
         this.#onLimbAction(command.action, command.limb);

@@ -2,6 +2,7 @@
  * Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. It runs
  * in a worker or in the page.
  */
+import { BodyInput } from "../input/body-input";
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
@@ -48,6 +49,7 @@ export class StageController {
   readonly hands: LimbController;
   readonly pointer: PointerInput;
   readonly velocity: VelocityInputs;
+  readonly body: BodyInput;
   readonly commands: CommandDispatcher;
   readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
@@ -89,6 +91,12 @@ export class StageController {
       smoothing: () => getMapping().pointerSmoothing,
       depthInput: (limb) => this.velocity.depthInput(limb),
     });
+    this.body = new BodyInput(this.hands, {
+      claim: (limb) => limbController.claim(limb, "camera"),
+      isFree,
+      isFacing: (performer) => this.stage.isFacing(performer),
+      selection,
+    });
     this.commands = new CommandDispatcher(this.hands, this.velocity, actions);
     limbController.stageInputs = {
       hands: this.hands,
@@ -106,6 +114,7 @@ export class StageController {
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;
     this.hands.puppeteer = playback?.puppeteer ?? null;
+    this.body.forget();
     this.updatePerformers();
   }
 

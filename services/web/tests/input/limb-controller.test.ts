@@ -177,3 +177,50 @@ describe("move", () => {
     expect(limbController.pullTarget(LEFT_HAND)).toBe(null);
   });
 });
+
+describe("reach", () => {
+  test("the hand's handle is brought where the person's hand is", () => {
+    const puppet = createStandingPuppet();
+    const session = new FakePuppeteer();
+    const limbController = createLimbController(puppet, session);
+    const [upper, fore] = ["l_shoulder", "l_elbow", "l_wrist"]
+      .map(jointPosition)
+      .map((at, i, all) => (i ? at.distanceTo(all[i - 1]) : 0))
+      .slice(1);
+    for (const [limb, side, sign] of [
+      [0, "l", 1],
+      [1, "r", -1],
+    ] as const) {
+      limbController.claim(limb, "camera");
+      session.takeCalls();
+      // Where the handle is: the hand stays there.
+      const offset = puppet.handle(limb, new Vector3()).sub(jointPosition(`${side}_shoulder`));
+      offset.divideScalar(upper + fore);
+      limbController.reach(limb, [sign * offset.x, offset.y, offset.z]);
+      const tip = new Vector3(sign * LEFT_FINGER_TIP.x, LEFT_FINGER_TIP.y, LEFT_FINGER_TIP.z);
+      const expected = tip.sub(jointPosition(`${side}_shoulder`)).divideScalar(ARM);
+      const [[asked, called, ...target]] = session.takeCalls();
+      expect([asked, called]).toEqual(["target", limb]);
+      expectClose(target, expected.toArray());
+    }
+  });
+
+  test("outwards is away from the body, for both hands", () => {
+    const session = new FakePuppeteer();
+    const limbController = createLimbController(createStandingPuppet(), session);
+    const [left, right] = [0, 1].map((limb) => {
+      limbController.claim(limb, "camera");
+      session.takeCalls();
+      limbController.reach(limb, [0.9, 0.2, 0.3]);
+      return session.takeCalls()[0].slice(2) as number[];
+    });
+    expect(left[0]).toBeGreaterThan(0.4);
+    expectClose([-right[0], right[1], right[2]], left);
+  });
+
+  test("a hand that is not held is not moved", () => {
+    const session = new FakePuppeteer();
+    createLimbController(createStandingPuppet(), session).reach(LEFT_HAND, [1, 0, 0]);
+    expect(session.calls).toEqual([]);
+  });
+});
