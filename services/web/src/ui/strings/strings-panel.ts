@@ -14,6 +14,7 @@ import {
   performerCount,
 } from "../limb-state";
 import { createPanel, type Panel } from "../panel";
+import { createCameraButton } from "./camera-button";
 import { createDirectionPad } from "./direction-pad";
 import { createNextPerformerButton, createPerformerChooser } from "./performer-chooser";
 
@@ -26,6 +27,8 @@ export interface StringsPanel {
   readonly dock: HTMLElement;
   /** Show a short message about an input that was not applied as sent. */
   notice(text: string): void;
+  /** Show whether the camera controls the hands. */
+  setCameraActive(isActive: boolean): void;
 }
 
 export interface StringsActions {
@@ -40,6 +43,8 @@ export interface StringsActions {
   nextDancer(): void;
   /** Report that a button for an input went down or came up. */
   press(input: DigitalInput, down: boolean): void;
+  /** Control the hands by camera, or stop it. */
+  useCamera(): void;
 }
 
 /** Action of a limb's button. */
@@ -135,6 +140,7 @@ export function createStringsPanel(
     { class: "text-button", type: "button", onClick: actions.keys },
     translate("Touch, gamepad and keys"),
   );
+  const camera = createCameraButton(actions.useCamera);
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
   panel.body.append(
@@ -142,6 +148,7 @@ export function createStringsPanel(
     element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)),
     hint,
     notice,
+    camera.element,
     keys,
   );
   const dock = element(
@@ -155,6 +162,7 @@ export function createStringsPanel(
   return {
     panel,
     dock,
+    setCameraActive: camera.setActive,
     notice(text) {
       clearTimeout(noticeTimer);
       setText(notice, text);
