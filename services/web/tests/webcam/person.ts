@@ -3,20 +3,13 @@
  * known. It wears a shirt, trousers and shoes, and has a face, since the detector looks for one.
  */
 import {
-  AmbientLight,
   Bone,
   CapsuleGeometry,
-  Color,
-  DirectionalLight,
   Group,
-  HemisphereLight,
   LatheGeometry,
   Mesh,
-  MeshLambertMaterial,
+  MeshBasicMaterial,
   type Object3D,
-  PerspectiveCamera,
-  PlaneGeometry,
-  Scene,
   SphereGeometry,
   Vector2,
   Vector3,
@@ -24,7 +17,7 @@ import {
 import { JOINTS, PARENTS, type Pose } from "../../src/motion/skeleton";
 import { jointPosition } from "../../src/stage/puppet/standard-figure";
 
-const material = (color: string) => new MeshLambertMaterial({ color });
+const material = (color: string) => new MeshBasicMaterial({ color });
 const SKIN = material("#d9a07e");
 const SHIRT = material("#2f5d8c");
 const TROUSERS = material("#3c3f46");
@@ -85,14 +78,14 @@ export class Person {
     return shape;
   }
 
-  #addEllipsoid(joint: string, at: Vector3, radii: [number, number, number], coat: MeshLambertMaterial): Object3D {
+  #addEllipsoid(joint: string, at: Vector3, radii: [number, number, number], coat: MeshBasicMaterial): Object3D {
     const mesh = new Mesh(new SphereGeometry(1, 28, 20), coat);
     mesh.scale.set(...radii);
     return this.#add(joint, mesh, at);
   }
 
   /** Add a limb's segment from `from` to `to`, with its radius at either end. */
-  #addSegment(joint: string, from: Vector3, to: Vector3, radii: [number, number], coat: MeshLambertMaterial): void {
+  #addSegment(joint: string, from: Vector3, to: Vector3, radii: [number, number], coat: MeshBasicMaterial): void {
     const length = from.distanceTo(to);
     const points: Vector2[] = [];
     for (let i = 0; i <= 24; i++) {
@@ -182,35 +175,4 @@ export class Person {
     const foot = new Vector3(ankle.x, 0.03, 0.03);
     this.#addEllipsoid(`${side}_ankle`, foot, [0.045, 0.038, 0.125], SHOES);
   }
-}
-
-export interface CameraView {
-  /** Distance of the camera from the person, and its height, in metres; how far it looks upwards, in radians. */
-  readonly distance: number;
-  readonly height: number;
-  readonly pitch?: number;
-  /** Vertical field of view in degrees: a laptop's camera has about 45. */
-  readonly fov?: number;
-}
-
-/** Return a room with light and the person in it. */
-export function createRoom(person: Person): Scene {
-  const scene = new Scene();
-  scene.background = new Color("#b9b2a6");
-  const wall = new Mesh(new PlaneGeometry(8, 5), material("#b7ae9f"));
-  wall.position.set(0, 1.5, -1.2);
-  const floor = new Mesh(new PlaneGeometry(8, 8), material("#7d6a55"));
-  floor.rotation.x = -Math.PI / 2;
-  const key = new DirectionalLight("#fff4e4", 2.2);
-  key.position.set(1.2, 2.6, 2.4);
-  scene.add(wall, floor, key, new HemisphereLight("#e8eefc", "#8a7a66", 1.4), new AmbientLight("#fff", 0.35));
-  scene.add(person.group);
-  return scene;
-}
-
-export function createCamera({ distance, height, pitch = 0, fov = 45 }: CameraView, aspect: number): PerspectiveCamera {
-  const camera = new PerspectiveCamera(fov, aspect, 0.05, 20);
-  camera.position.set(0, height, distance);
-  camera.rotation.x = pitch;
-  return camera;
 }
