@@ -21,7 +21,6 @@ import { SoundController } from "./sound-controller";
 import { StageHost } from "./stage-host";
 import type { StartupSequence } from "./startup";
 import { type AppParts, createKeyActions, createUserActions } from "./user-actions";
-import { WebcamSlot } from "./webcam-slot";
 
 export class App implements AppParts {
   readonly displayName: string;
@@ -33,7 +32,6 @@ export class App implements AppParts {
   readonly stageHost: StageHost;
   readonly playback: PlaybackController;
   readonly exporter: Exporter;
-  readonly webcam: WebcamSlot;
   readonly theme: ThemeChoice;
   #mapping: Mapping = loadMapping();
 
@@ -60,7 +58,6 @@ export class App implements AppParts {
     );
     const send = (command: EngineCommand) => engine.post(command);
     this.limbs = new LimbControls(send, createKeyActions(this));
-    this.webcam = new WebcamSlot(page, this.limbs);
     this.exporter = new Exporter(page, () => this.stageHost.takePicture());
     this.library = new LibraryController(page, () => this.playback.current);
     this.soundController = new SoundController(

@@ -20,7 +20,6 @@ import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
 import type { SoundController } from "./sound-controller";
 import type { StageHost } from "./stage-host";
-import type { WebcamSlot } from "./webcam-slot";
 
 /** Parts of the application that actions use. An action reads them when it runs: the page is built before them. */
 export interface AppParts {
@@ -33,7 +32,6 @@ export interface AppParts {
   readonly stageHost: StageHost;
   readonly playback: PlaybackController;
   readonly exporter: Exporter;
-  readonly webcam: WebcamSlot;
   readonly theme: ThemeChoice;
   setMapping(mapping: Mapping): void;
 }
@@ -75,7 +73,8 @@ export function createUserActions(app: AppParts): UserActions {
       if (down) commands.press(`page ${input}`, [input], 1, performance.now());
       else commands.release(`page ${input}`, performance.now());
     },
-    useCamera: () => app.webcam.toggle(),
+    useCamera: (onChange) =>
+      import("./webcam-controller").then(({ toggleWebcam }) => toggleWebcam(app.page.toast, app.limbs, onChange)),
     mapping: (mapping) => app.setMapping(mapping),
     focus: (limb) => app.limbs.focus(limb),
     dancer: (performer) => app.limbs.selectPerformer(performer),

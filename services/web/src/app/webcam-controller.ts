@@ -6,6 +6,7 @@ import type { BodyMessage } from "../input/body-input";
 import { createWebcamCard, type WebcamCard, type WebcamProblem } from "../ui/webcam/webcam-card";
 import { BodyCamera, type CameraFrame, ModelError, NO_HANDS } from "../webcam/body-camera";
 import { CameraError, type CameraFailure, type CameraSource } from "../webcam/camera";
+import type { LimbControls } from "./limb-controls";
 
 /** Time in the background after which the camera is switched off, in milliseconds. */
 export const HIDDEN_TIMEOUT_MS = 30_000;
@@ -27,7 +28,7 @@ const MODEL_PROBLEM: WebcamProblem = {
   remedy: "The detector could not be loaded or run. Check your connection, then try again, or use another browser.",
 };
 
-export interface WebcamOptions {
+interface WebcamOptions {
   readonly root: HTMLElement;
   readonly source: CameraSource;
   /** Move the hands. `now` is the time of the picture in milliseconds. */
@@ -37,7 +38,33 @@ export interface WebcamOptions {
   toast(message: string): void;
 }
 
-export class WebcamController {
+/** The camera of the page while it is on. */
+let current: WebcamController | null = null;
+
+/** Switch the camera of the page on, or off. `onChange` is told whether it is on. */
+export function toggleWebcam(
+  toast: (message: string) => void,
+  limbs: Pick<LimbControls, "moveBody">,
+  onChange: (isOn: boolean) => void,
+): void {
+  if (current) {
+    current.stop();
+    return;
+  }
+  onChange(true);
+  current = new WebcamController({
+    root: document.body,
+    source: navigator.mediaDevices,
+    move: (hands, now) => limbs.moveBody(hands, now),
+    onStop: () => {
+      current = null;
+      onChange(false);
+    },
+    toast,
+  });
+}
+
+class WebcamController {
   readonly #card: WebcamCard;
   #camera: BodyCamera | null = null;
   #hiddenTimer: ReturnType<typeof setTimeout> | undefined;
@@ -85,6 +112,8 @@ export class WebcamController {
   }
 
   #onFrame(frame: CameraFrame): void {
+    // A picture from before the page was hidden.
+    if (document.hidden) return;
     const { phase, progress, hands, now } = frame;
     this.options.move(hands, now);
     this.#card.mirror.draw(frame);

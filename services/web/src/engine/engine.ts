@@ -130,7 +130,7 @@ export class Engine {
 
   /** Handle a message of the page. */
   handle(command: EngineCommand): void {
-    const { body, commands, pointer, stage, velocity } = this.#controller ?? {};
+    const { commands, pointer, stage, velocity } = this.#controller ?? {};
     switch (command.type) {
       case "set":
         Object.assign(this.#settings, command.settings);
@@ -166,11 +166,11 @@ export class Engine {
         if (this.#settings.isHidden) velocity?.update(performance.now());
         break;
       case "body":
-        body?.handle(command.hands, this.#toLocal(command.now));
+        void this.#controller?.moveHands(command.hands, this.#toLocal(command.now));
         break;
       case "release limbs":
         velocity?.releaseAll();
-        body?.releaseAll();
+        void this.#controller?.moveHands(null, 0);
         break;
       case "limb":
         this.#onLimbAction(command.action, command.limb);

@@ -2,7 +2,7 @@
  * Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. It runs
  * in a worker or in the page.
  */
-import { BodyInput } from "../input/body-input";
+import type { BodyInput, BodyMessage } from "../input/body-input";
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
@@ -49,10 +49,11 @@ export class StageController {
   readonly hands: LimbController;
   readonly pointer: PointerInput;
   readonly velocity: VelocityInputs;
-  readonly body: BodyInput;
   readonly commands: CommandDispatcher;
   readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
+  /** Hands before the camera, whose code is loaded with the first of them. */
+  #body: Promise<BodyInput> | null = null;
   #lastDrawMs = 0;
   /** Last selected performer, and the time in milliseconds until which its rings are highlighted. */
   #ringHighlight = { performer: 0, until: 0 };
@@ -91,12 +92,6 @@ export class StageController {
       smoothing: () => getMapping().pointerSmoothing,
       depthInput: (limb) => this.velocity.depthInput(limb),
     });
-    this.body = new BodyInput(this.hands, {
-      claim: (limb) => limbController.claim(limb, "camera"),
-      isFree,
-      isFacing: (performer) => this.stage.isFacing(performer),
-      selection,
-    });
     this.commands = new CommandDispatcher(this.hands, this.velocity, actions);
     limbController.stageInputs = {
       hands: this.hands,
@@ -114,7 +109,7 @@ export class StageController {
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;
     this.hands.puppeteer = playback?.puppeteer ?? null;
-    this.body.forget();
+    this.#body = null;
     this.updatePerformers();
   }
 
@@ -127,6 +122,15 @@ export class StageController {
         performers.map((performer) => performer?.figure ?? figure),
         front,
       );
+  }
+
+  /** Follow the hands before the camera; null releases them. `now` is in milliseconds. */
+  async moveHands(hands: BodyMessage | null, now: number): Promise<void> {
+    if (!hands && !this.#body) return;
+    this.#body ??= import("../input/body-input").then(
+      ({ BodyInput }) => new BodyInput(this.hands, this.limbController, this.stage),
+    );
+    (await this.#body).handle(hands, now);
   }
 
   /** Draw the frame of local time `now` in milliseconds. `focusedLimb` is the limb whose control has the focus. */

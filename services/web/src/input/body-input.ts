@@ -3,9 +3,19 @@
  * audience, from behind if it shows its back. In both cases the hand on the right of the picture moves the performer's
  * hand on the right of the stage.
  */
-import { limbNumber, performerOfLimb } from "../wire/limbs";
-import type { HandReach, LimbController } from "./limb-controller";
+import { Vector3 } from "three";
+import type { Performer } from "../stage/puppet/performer";
+import type { Stage } from "../stage/stage";
+import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
+import type { HoldSource, LimbController } from "./limb-controller";
 import type { PerformerSelection } from "./performer-selection";
+import { orientationOf, positionOf } from "./target-frame";
+
+/**
+ * Position of a hand relative to its shoulder, in lengths of the arm from shoulder to wrist: away from the body's
+ * middle, up, and forwards.
+ */
+export type HandReach = readonly [outwards: number, up: number, forwards: number];
 
 /** What is known of a hand: where it is, or `"hold"` while it is briefly not seen; null if it lets go. */
 export type HandState = HandReach | "hold" | null;
@@ -19,14 +29,13 @@ export interface BodyMessage {
 /** Minimum time between attempts to claim a limb that another puppeteer held, in milliseconds. */
 const CLAIM_RETRY_MS = 300;
 
-export interface BodyActions {
-  /** Claim a limb for the camera. Return false if it is not available; the user has been told why. */
-  claim(limb: number): boolean;
+/** Claims of limbs by this page. */
+export interface LimbClaims {
+  /** Claim a limb. Return false if it is not available; the user has been told why. */
+  claim(limb: number, source: HoldSource): boolean;
   /** True if no puppeteer holds a limb. */
   isFree(limb: number): boolean;
-  /** True if a performer faces the audience. */
-  isFacing(performer: number): boolean;
-  readonly selection: PerformerSelection;
+  readonly selectedPerformer: PerformerSelection;
 }
 
 class Hand {
@@ -44,12 +53,20 @@ export class BodyInput {
 
   constructor(
     private readonly limbs: LimbController,
-    private readonly actions: BodyActions,
+    private readonly claims: LimbClaims,
+    private readonly stage: Pick<Stage, "performers" | "back">,
   ) {}
 
-  /** Follow the hands. `now` is in milliseconds and never decreases. */
-  handle(message: BodyMessage, now: number): void {
-    const { selection } = this.actions;
+  /**
+   * Follow the hands. With null, release both; each must let go before it claims again. `now` is in milliseconds and
+   * never decreases.
+   */
+  handle(message: BodyMessage | null, now: number): void {
+    if (!message) {
+      this.#releaseAll();
+      return;
+    }
+    const selection = this.claims.selectedPerformer;
     const { left, right } = this.#hands;
     for (const hand of [left, right]) {
       this.#updateHold(hand);
@@ -59,19 +76,13 @@ export class BodyInput {
     const held = left.limb ?? right.limb;
     const isCrossed =
       held === null
-        ? this.actions.isFacing(selection.performer)
+        ? this.#isFacing(selection.performer)
         : held === limbNumber(selection.performer, left.limb === null ? 0 : 1);
     this.#move(left, limbNumber(selection.performer, isCrossed ? 1 : 0), message.left, now);
     this.#move(right, limbNumber(selection.performer, isCrossed ? 0 : 1), message.right, now);
   }
 
-  /** Forget the limbs that are held: those of another session. */
-  forget(): void {
-    for (const hand of [this.#hands.left, this.#hands.right]) hand.limb = null;
-  }
-
-  /** Release both hands; each must let go before it claims again. */
-  releaseAll(): void {
+  #releaseAll(): void {
     for (const hand of [this.#hands.left, this.#hands.right]) {
       this.#updateHold(hand);
       if (hand.limb === null) continue;
@@ -84,7 +95,7 @@ export class BodyInput {
   #updateHold(hand: Hand): void {
     if (hand.limb === null || this.limbs.source(hand.limb) === "camera") return;
     if (this.limbs.source(hand.limb) === null) {
-      hand.needsRest = this.actions.isFree(hand.limb);
+      hand.needsRest = this.claims.isFree(hand.limb);
       hand.isContested = !hand.needsRest;
     }
     hand.limb = null;
@@ -98,7 +109,28 @@ export class BodyInput {
     }
     if (state === "hold") return;
     if (hand.limb === null && !hand.needsRest) this.#claim(hand, limb, now);
-    if (hand.limb !== null) this.limbs.reach(limb, state);
+    if (hand.limb !== null) this.#reach(limb, state);
+  }
+
+  /** Bring a hand where the person's hand is relative to the shoulder. */
+  #reach(limb: number, [outwards, up, forwards]: HandReach): void {
+    const performer = this.stage.performers[performerOfLimb(limb)];
+    if (!performer) return;
+    const isLeft = limbWithinPerformer(limb) === 0;
+    const side = isLeft ? "l" : "r";
+    const shoulder = positionOf(performer.joint(`${side}_shoulder`));
+    const handle = new Vector3(isLeft ? outwards : -outwards, up, forwards)
+      .multiplyScalar(measureArm(performer, side))
+      .applyQuaternion(orientationOf(performer.joint("vl5")))
+      .add(shoulder);
+    this.limbs.pullHand(limb, handle);
+  }
+
+  /** Return whether a performer's chest faces the audience rather than its back. */
+  #isFacing(performer: number): boolean {
+    const { stage } = this;
+    const chest = stage.performers[performer]?.joint("vl5");
+    return !chest || new Vector3().setFromMatrixColumn(chest, 2).dot(stage.back()) >= 0;
   }
 
   #claim(hand: Hand, limb: number, now: number): void {
@@ -106,9 +138,9 @@ export class BodyInput {
     // A limb that was granted on request is held as by a key.
     if (source !== null && !(source === "velocity" && hand.isContested)) return;
     const isTried = hand.isContested && source === null;
-    if (isTried && (now - hand.triedAt < CLAIM_RETRY_MS || !this.actions.isFree(limb))) return;
+    if (isTried && (now - hand.triedAt < CLAIM_RETRY_MS || !this.claims.isFree(limb))) return;
     hand.triedAt = now;
-    hand.isContested = !this.actions.claim(limb);
+    hand.isContested = !this.claims.claim(limb, "camera");
     if (!hand.isContested) hand.limb = limb;
   }
 
@@ -116,4 +148,10 @@ export class BodyInput {
     if (hand.limb !== null && this.limbs.source(hand.limb) === "camera") this.limbs.release(hand.limb);
     hand.limb = null;
   }
+}
+
+/** Return the length of the streamed figure's arm from shoulder to wrist, in metres. */
+function measureArm({ joint }: Performer, side: string): number {
+  const [shoulder, elbow, wrist] = ["shoulder", "elbow", "wrist"].map((name) => positionOf(joint(`${side}_${name}`)));
+  return shoulder.distanceTo(elbow) + elbow.distanceTo(wrist);
 }

@@ -16,12 +16,6 @@ import { orientationOf, positionOf, solveThighAngle, toChestFrame, toShoulderFra
  */
 export type HoldSource = "pointer" | "velocity" | "camera";
 
-/**
- * Position of a hand relative to its shoulder, in lengths of the arm from shoulder to wrist: away from the body's
- * middle, up, and forwards.
- */
-export type HandReach = readonly [outwards: number, up: number, forwards: number];
-
 export class LimbController {
   /** Called when the limbs held here change. */
   onChange: () => void = () => undefined;
@@ -93,7 +87,7 @@ export class LimbController {
     // In the measures of the streamed figure, whichever performer is shown.
     const handleTarget = performer.toStreamedHandle(limbIndex, to, new Vector3());
     const side = limbIndex % 2 === 0 ? "l" : "r";
-    if (limbIndex < 2) this.#pullHand(limb, performer, handleTarget);
+    if (limbIndex < 2) this.pullHand(limb, handleTarget);
     else {
       const hip = positionOf(performer.joint(`${side}_hip`));
       const angle = solveThighAngle(
@@ -106,18 +100,19 @@ export class LimbController {
     }
   }
 
-  /** Bring a hand where a person's hand is relative to the shoulder. */
-  reach(limb: number, [outwards, up, forwards]: HandReach): void {
+  /** Pull the handle of a streamed figure's hand to a world position. */
+  pullHand(limb: number, handle: Vector3): void {
     const performer = this.#stage.performers[performerOfLimb(limb)];
     if (!performer || this.#sources[limb] === null) return;
-    this.#pullTargets[limb] = null;
-    const side = limbWithinPerformer(limb) === 0 ? "l" : "r";
-    const length = jointOffset(performer, `${side}_elbow`).length() + jointOffset(performer, `${side}_wrist`).length();
-    const handle = new Vector3(side === "l" ? outwards : -outwards, up, forwards)
-      .multiplyScalar(length)
-      .applyQuaternion(orientationOf(performer.joint("vl5")))
-      .add(positionOf(performer.joint(`${side}_shoulder`)));
-    this.#pullHand(limb, performer, handle);
+    const limbIndex = limbWithinPerformer(limb);
+    const side = limbIndex === 0 ? "l" : "r";
+    const wrist = performer.joint(`${side}_wrist`);
+    const fingers = jointTip(performer, `${side}_wrist`).applyMatrix4(wrist);
+    const tip = fingers.sub(handlePosition(performer, limbIndex, new Vector3())).add(handle);
+    const shoulder = positionOf(performer.joint(`${side}_shoulder`));
+    const chest = orientationOf(performer.joint("vl5"));
+    const { x, y, z } = toShoulderFrame(tip, shoulder, chest, armLength(performer, side));
+    this.#puppeteer?.target(limb, x, y, z);
   }
 
   /** Move a limb at -1..1 of full speed to the right, up and towards the audience; legs use `up` alone. */
@@ -137,19 +132,6 @@ export class LimbController {
     const { x, y, z } = toChestFrame(direction, orientationOf(performer.joint("vl5")));
     // Coarse steps, so that small movements of the chest do not cause new inputs.
     this.#puppeteer?.velocity(limb, quantise(x), quantise(y), quantise(z));
-  }
-
-  /** Pull the handle of a streamed figure's hand to a world position. */
-  #pullHand(limb: number, performer: Performer, handle: Vector3): void {
-    const limbIndex = limbWithinPerformer(limb);
-    const side = limbIndex === 0 ? "l" : "r";
-    const wrist = performer.joint(`${side}_wrist`);
-    const fingers = jointTip(performer, `${side}_wrist`).applyMatrix4(wrist);
-    const tip = fingers.sub(handlePosition(performer, limbIndex, new Vector3())).add(handle);
-    const shoulder = positionOf(performer.joint(`${side}_shoulder`));
-    const chest = orientationOf(performer.joint("vl5"));
-    const { x, y, z } = toShoulderFrame(tip, shoulder, chest, armLength(performer, side));
-    this.#puppeteer?.target(limb, x, y, z);
   }
 
   #clearLimb(limb: number): void {

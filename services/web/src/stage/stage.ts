@@ -317,12 +317,6 @@ export class Stage {
     return new Vector3().setFromMatrixColumn(this.audience.camera.matrixWorld, 2);
   }
 
-  /** Return whether a performer's chest faces the audience rather than its back. */
-  isFacing(performer: number): boolean {
-    const chest = this.performers[performer]?.joint("vl5");
-    return !chest || new Vector3().setFromMatrixColumn(chest, 2).dot(this.back()) >= 0;
-  }
-
   /** Return the world position of the first performer's free hand nearer to the camera; null if none is free. */
   nearerHand(): Vector3 | null {
     const { puppet } = this;

@@ -103,6 +103,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
     (name, open) => {
       transport.setExpanded(name, open);
       if (name === "line" && open) link.load();
+      if (name === "strings" && open) strings.load();
       strings.dock.hidden = panels.isOpen("strings") || panels.isSheetOpen;
       occupied.invalidate();
       actions.reframe();

@@ -1,6 +1,7 @@
 /**
  * Calibration by standing still: the length of the person's arms in metres of the model, which knows nobody's size. The
- * arms give it if they hang in view, else the shoulders, so that it also works for a person who sits at a desk. Pure.
+ * arms give it if they hang in view, else the shoulders, so that it also works for a person who sits at a desk. The size
+ * of the person in the picture is kept too, as the reference for later pictures. Pure.
  */
 import { type ArmView, type BodyView, SIDES } from "./body-view";
 
@@ -16,6 +17,15 @@ const TYPICAL_ARM = 1.5;
 /** Measured lengths beyond these shares of the typical one are arms that point at the camera, or errors. */
 const ARM_RANGE = [0.9, 1.25] as const;
 
+/** Measures of a person who stands still. */
+export interface Stature {
+  /** Length of an arm from shoulder to wrist in metres of the model. */
+  readonly armLength: number;
+  /** As in `BodyView`. */
+  readonly scale: number;
+  readonly trunk: number | null;
+}
+
 interface Sample {
   readonly seconds: number;
   readonly view: BodyView;
@@ -23,16 +33,16 @@ interface Sample {
 
 export class Calibration {
   #samples: Sample[] = [];
-  #armLength: number | null = null;
+  #stature: Stature | null = null;
 
-  /** Length of an arm from shoulder to wrist in metres of the model; null until the person has stood still. */
-  get armLength(): number | null {
-    return this.#armLength;
+  /** Null until the person has stood still. */
+  get stature(): Stature | null {
+    return this.#stature;
   }
 
   /** Share of the time for which the person has stood still, 0 to 1. */
   get progress(): number {
-    if (this.#armLength !== null) return 1;
+    if (this.#stature !== null) return 1;
     const [first, last] = [this.#samples[0], this.#samples.at(-1)];
     return first && last ? Math.min(1, (last.seconds - first.seconds) / STILL_S) : 0;
   }
@@ -40,12 +50,12 @@ export class Calibration {
   /** Start again. */
   reset(): void {
     this.#samples = [];
-    this.#armLength = null;
+    this.#stature = null;
   }
 
   /** Add what a picture shows; null if it shows no person. */
   add(view: BodyView | null, seconds: number): void {
-    if (this.#armLength !== null) return;
+    if (this.#stature !== null) return;
     if (!view || SIDES.some((side) => view[side].shoulderVisibility < MIN_VISIBILITY)) {
       this.#samples = [];
       return;
@@ -55,7 +65,7 @@ export class Calibration {
     this.#samples.splice(0, lastMoved + 1);
     this.#samples.push({ seconds, view });
     if (this.#samples.length >= MIN_SAMPLES && this.progress === 1)
-      this.#armLength = measureArm(this.#samples.map((sample) => sample.view));
+      this.#stature = measure(this.#samples.map((sample) => sample.view));
   }
 }
 
@@ -65,6 +75,15 @@ function hasMoved(from: BodyView, to: BodyView): boolean {
     (side) =>
       Math.hypot(from[side].shoulder.x - to[side].shoulder.x, from[side].shoulder.y - to[side].shoulder.y) > limit,
   );
+}
+
+function measure(views: readonly BodyView[]): Stature {
+  const trunks = views.flatMap(({ trunk }) => trunk ?? []);
+  return {
+    armLength: measureArm(views),
+    scale: median(views.map(({ scale }) => scale)),
+    trunk: trunks.length > views.length / 2 ? median(trunks) : null,
+  };
 }
 
 function measureArm(views: readonly BodyView[]): number {

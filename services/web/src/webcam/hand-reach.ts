@@ -2,7 +2,7 @@
  * Position of a hand relative to its shoulder, in arm lengths, from a picture. Across the picture it is measured, with
  * the perspective of a typical camera; the depth is the model's estimate. Pure.
  */
-import type { HandReach } from "../input/limb-controller";
+import type { HandReach } from "../input/body-input";
 import type { ArmView, Side } from "./body-view";
 
 /** Focal length of a webcam in heights of its picture: a vertical field of view of 45 degrees. */

@@ -2,11 +2,10 @@
  * Hands of a person from the landmarks of successive pictures: finds the shoulders, calibrates while the person stands
  * still, then follows both hands, smoothed and as far as they are seen. Pure.
  */
-import type { BodyMessage, HandState } from "../input/body-input";
-import type { HandReach } from "../input/limb-controller";
+import type { BodyMessage, HandReach, HandState } from "../input/body-input";
 import { OneEuro } from "../input/one-euro";
 import { type BodyView, SIDES, type Side, viewBody } from "./body-view";
-import { Calibration } from "./calibration";
+import { Calibration, type Stature } from "./calibration";
 import { handReach } from "./hand-reach";
 import type { DetectedBody } from "./landmark";
 import { VisibilityGate } from "./visibility-gate";
@@ -25,6 +24,8 @@ export interface TrackedHands {
 const SMOOTHING = { minCutoff: 1.2, beta: 3, derivativeCutoff: 1 };
 /** Time constant of the smoothing of the person's size in the picture, in seconds. */
 const SCALE_TIME_S = 0.8;
+/** The same while the shoulders become narrower, as they do whenever the arms are raised. */
+const NARROWING_TIME_S = 8;
 /** Time without a person after which another may have come, so that it is calibrated again, in seconds. */
 export const FORGET_S = 10;
 const MIN_SHOULDER_VISIBILITY = 0.5;
@@ -58,17 +59,21 @@ export class HandTracker {
     if (isSeen) this.#seenAt = seconds;
     else if (seconds - this.#seenAt > FORGET_S) this.recalibrate();
     this.#calibration.add(view, seconds);
-    const { armLength, progress } = this.#calibration;
-    if (armLength === null) return { phase: isSeen ? "calibrating" : "searching", progress, hands: NO_HANDS };
-    if (view && isSeen) this.#followScale(view.scale, seconds);
-    const find = (side: Side) => this.#findHand(side, isSeen ? view : null, armLength, seconds);
+    const { stature, progress } = this.#calibration;
+    if (stature === null) return { phase: isSeen ? "calibrating" : "searching", progress, hands: NO_HANDS };
+    if (view && isSeen) this.#followScale(view, stature, seconds);
+    const find = (side: Side) => this.#findHand(side, isSeen ? view : null, stature.armLength, seconds);
     return { phase: isSeen ? "following" : "searching", progress, hands: { left: find("left"), right: find("right") } };
   }
 
-  #followScale(value: number, seconds: number): void {
-    const share = this.#scale ? 1 - Math.exp(-(seconds - this.#scale.seconds) / SCALE_TIME_S) : 1;
-    const before = this.#scale?.value ?? value;
-    this.#scale = { value: before + (value - before) * share, seconds };
+  /** Follow the person's size in the picture: by the trunk, whose length the arms do not change, else the shoulders. */
+  #followScale(view: BodyView, stature: Stature, seconds: number): void {
+    const growth = view.trunk !== null && stature.trunk !== null ? view.trunk / stature.trunk : null;
+    const value = growth === null ? view.scale : stature.scale * growth;
+    const before = this.#scale ?? { value: stature.scale, seconds };
+    const time = growth !== null || value > before.value ? SCALE_TIME_S : NARROWING_TIME_S;
+    const share = 1 - Math.exp(-(seconds - before.seconds) / time);
+    this.#scale = { value: before.value + (value - before.value) * share, seconds };
   }
 
   #findHand(side: Side, view: BodyView | null, armLength: number, seconds: number): HandState {

@@ -45,8 +45,9 @@ async function recordTracks(page: Page): Promise<void> {
 function captureTimer(duration: number): void {
   const start = window.setTimeout.bind(window);
   window.setTimeout = ((callback: () => void, delay?: number, ...rest: unknown[]) => {
-    if (delay === duration) window.runTimer = callback;
-    return start(callback, delay, ...rest);
+    if (delay !== duration) return start(callback, delay, ...rest);
+    window.runTimer = callback;
+    return 0;
   }) as typeof window.setTimeout;
 }
 

@@ -1,7 +1,8 @@
+import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
-import { BodyInput, type BodyMessage } from "../../src/input/body-input";
-import type { HandReach } from "../../src/input/limb-controller";
+import { BodyInput, type BodyMessage, type HandReach } from "../../src/input/body-input";
 import { PerformerSelection } from "../../src/input/performer-selection";
+import { jointPosition, LEFT_FINGER_TIP } from "../../src/stage/puppet/standard-figure";
 import { createStandingPuppet } from "../stage/puppet/figures";
 import { createLimbController, FakePuppeteer } from "./fake-puppeteer";
 
@@ -11,24 +12,32 @@ const OUT: HandReach = [0.8, 0, 0.1];
 /** A puppeteer's page: the limbs, who else holds one, and the notices of claims in vain. */
 class Stage {
   readonly session = new FakePuppeteer();
-  readonly limbs = createLimbController([createStandingPuppet(), createStandingPuppet()], this.session);
+  readonly puppets = [createStandingPuppet(), createStandingPuppet()];
+  readonly limbs = createLimbController(this.puppets, this.session);
   readonly selection = new PerformerSelection();
   readonly othersLimbs = new Set<number>();
   readonly refused: number[] = [];
   isFacing = true;
   now = 0;
-  readonly body = new BodyInput(this.limbs, {
-    claim: (limb) => {
-      if (this.othersLimbs.has(limb)) this.refused.push(limb);
-      return !this.othersLimbs.has(limb) && this.limbs.claim(limb, "camera");
-    },
-    isFree: (limb) => !this.othersLimbs.has(limb) && this.limbs.source(limb) === null,
-    isFacing: () => this.isFacing,
-    selection: this.selection,
-  });
+  body = this.createBody();
 
   constructor() {
     this.selection.count = 2;
+  }
+
+  createBody(): BodyInput {
+    return new BodyInput(
+      this.limbs,
+      {
+        claim: (limb, source) => {
+          if (this.othersLimbs.has(limb)) this.refused.push(limb);
+          return !this.othersLimbs.has(limb) && this.limbs.claim(limb, source);
+        },
+        isFree: (limb) => !this.othersLimbs.has(limb) && this.limbs.source(limb) === null,
+        selectedPerformer: this.selection,
+      },
+      { performers: this.puppets, back: () => new Vector3(0, 0, this.isFacing ? 1 : -1) },
+    );
   }
 
   show(hands: Partial<BodyMessage>, elapsed = 100): void {
@@ -110,7 +119,7 @@ describe("hold and release", () => {
   test("release of all hands", () => {
     const stage = new Stage();
     stage.show({ left: OUT, right: OUT });
-    stage.body.releaseAll();
+    stage.body.handle(null, stage.now);
     expect(stage.held).toEqual([]);
     stage.show({ left: OUT, right: OUT });
     expect(stage.held).toEqual([]);
@@ -124,7 +133,7 @@ describe("hold and release", () => {
     stage.show({ right: OUT });
     const next = new FakePuppeteer();
     stage.limbs.puppeteer = next as never;
-    stage.body.forget();
+    stage.body = stage.createBody();
     stage.show({ right: OUT });
     expect(next.calls[0]).toEqual(["claim", LEFT_HAND]);
   });
@@ -181,5 +190,39 @@ describe("limbs that are held otherwise", () => {
     stage.show({ right: OUT });
     stage.show({});
     expect(stage.limbs.source(LEFT_HAND)).toBe("velocity");
+  });
+});
+
+describe("reach", () => {
+  const ARM = ["l_shoulder", "l_elbow", "l_wrist"].map(jointPosition);
+  const [UPPER, FORE] = [ARM[0].distanceTo(ARM[1]), ARM[1].distanceTo(ARM[2])];
+
+  /** Show the right hand and return the target of the performer's left hand, in arm lengths to the finger tips. */
+  function targetOf(reach: HandReach): number[] {
+    const stage = new Stage();
+    stage.show({ right: reach });
+    const call = stage.session.calls.find(([asked]) => asked === "target");
+    return (call?.slice(2) ?? []) as number[];
+  }
+
+  test("the performer's hand goes where the person's hand is, by its middle", () => {
+    // Where it is already: the finger tips stay.
+    const at = createStandingPuppet()
+      .handle(LEFT_HAND, new Vector3())
+      .sub(ARM[0])
+      .divideScalar(UPPER + FORE);
+    const tip = LEFT_FINGER_TIP.clone().sub(ARM[0]);
+    tip.divideScalar(UPPER + FORE + ARM[2].distanceTo(LEFT_FINGER_TIP));
+    const target = targetOf([at.x, at.y, at.z]);
+    tip.toArray().forEach((value, axis) => void expect(target[axis]).toBeCloseTo(value, 6));
+  });
+
+  test("outwards is away from the body, for both hands", () => {
+    const stage = new Stage();
+    stage.show({ left: [0.9, 0.2, 0.3], right: [0.9, 0.2, 0.3] });
+    const targets = stage.session.calls.filter(([asked]) => asked === "target");
+    const [right, left] = targets.map((call) => call.slice(2) as number[]);
+    expect(left[0]).toBeGreaterThan(0.4);
+    [-right[0], right[1], right[2]].forEach((value, axis) => void expect(value).toBeCloseTo(left[axis], 6));
   });
 });

@@ -10,6 +10,7 @@ test("points are in heights of the picture, from its centre", () => {
   // 1.2 heights per metre at a distance of one metre.
   expect(view?.scale).toBeCloseTo(0.6, 6);
   expect(view?.shoulderWidth).toBeCloseTo(SHOULDER_WIDTH_M, 6);
+  expect(view?.trunk).toBeCloseTo(0.5 * 0.6, 6);
   // The person's left is at the right of the picture.
   expect(view?.left.shoulder.x).toBeCloseTo(0.2 * 0.6, 6);
   expect(view?.right.shoulder.x).toBeCloseTo(-0.2 * 0.6, 6);

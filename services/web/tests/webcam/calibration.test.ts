@@ -19,15 +19,15 @@ describe("standing still", () => {
     for (const distance of [1.2, 2, 3]) {
       const calibration = new Calibration();
       show(calibration, detect(ARMS_DOWN, { distance, modelScale }), 0, STILL_S);
-      expect(calibration.armLength).toBeCloseTo(ARM_M * modelScale, 3);
+      expect(calibration.stature?.armLength).toBeCloseTo(ARM_M * modelScale, 3);
     }
   });
 
   test("takes its time, and tells its progress", () => {
     const calibration = new Calibration();
-    expect([calibration.armLength, calibration.progress]).toEqual([null, 0]);
+    expect([calibration.stature, calibration.progress]).toEqual([null, 0]);
     show(calibration, detect(ARMS_DOWN), 0, STILL_S / 2);
-    expect(calibration.armLength).toBe(null);
+    expect(calibration.stature).toBe(null);
     expect(calibration.progress).toBeCloseTo(0.5, 6);
     show(calibration, detect(ARMS_DOWN), STILL_S / 2, STILL_S / 2);
     expect(calibration.progress).toBe(1);
@@ -37,32 +37,32 @@ describe("standing still", () => {
     const calibration = new Calibration();
     let now = show(calibration, detect(ARMS_DOWN), 0, STILL_S * 0.9);
     now = show(calibration, detect(ARMS_DOWN, { right: 0.3 }), now + 0.1, STILL_S * 0.9);
-    expect(calibration.armLength).toBe(null);
+    expect(calibration.stature).toBe(null);
     now = show(calibration, null, now + 0.1, 0.1);
     expect(calibration.progress).toBe(0);
     show(calibration, detect(ARMS_DOWN), now + 0.1, STILL_S);
-    expect(calibration.armLength).not.toBe(null);
+    expect(calibration.stature).not.toBe(null);
   });
 
   test("a breath is no step", () => {
     const calibration = new Calibration();
     for (let frame = 0; frame <= STILL_S * FPS; frame++)
       calibration.add(viewBody(detect(ARMS_DOWN, { right: 0.02 * Math.sin(frame) }), ASPECT), frame / FPS);
-    expect(calibration.armLength).not.toBe(null);
+    expect(calibration.stature).not.toBe(null);
   });
 
   test("of a person at a desk, whose arms are not seen, uses the shoulders", () => {
     const calibration = new Calibration();
     const body = hide(detect(ARMS_DOWN, { distance: 0.7 }), 0.1, "leftWrist", "rightWrist");
     show(calibration, body, 0, STILL_S);
-    expect(calibration.armLength).toBeCloseTo(1.5 * SHOULDER_WIDTH_M, 6);
+    expect(calibration.stature?.armLength).toBeCloseTo(1.5 * SHOULDER_WIDTH_M, 6);
   });
 
   test("arms that point at the camera are not measured", () => {
     const calibration = new Calibration();
     const body = hide(detect(RIGHT_FOREARM_AHEAD), 0.1, "leftWrist");
     show(calibration, body, 0, STILL_S);
-    expect(calibration.armLength).toBeCloseTo(1.5 * SHOULDER_WIDTH_M, 6);
+    expect(calibration.stature?.armLength).toBeCloseTo(1.5 * SHOULDER_WIDTH_M, 6);
   });
 
   test("a hidden shoulder is waited for", () => {
@@ -75,9 +75,20 @@ describe("standing still", () => {
 test("it stays until it is reset", () => {
   const calibration = new Calibration();
   const now = show(calibration, detect(ARMS_DOWN), 0, STILL_S);
-  const { armLength } = calibration;
+  const { stature } = calibration;
   show(calibration, detect(ARMS_DOWN, { modelScale: 0.5 }), now, STILL_S);
-  expect(calibration.armLength).toBe(armLength);
+  expect(calibration.stature).toBe(stature);
   calibration.reset();
-  expect([calibration.armLength, calibration.progress]).toEqual([null, 0]);
+  expect([calibration.stature, calibration.progress]).toEqual([null, 0]);
+});
+
+test("the size of the person in the picture is kept", () => {
+  const calibration = new Calibration();
+  show(calibration, detect(ARMS_DOWN, { distance: 2 }), 0, STILL_S);
+  expect(calibration.stature?.scale).toBeCloseTo(0.6, 3);
+  // The shoulders of the figure are 0.5 m above its hips.
+  expect(calibration.stature?.trunk).toBeCloseTo(0.3, 3);
+  const seated = new Calibration();
+  show(seated, hide(detect(ARMS_DOWN), 0.1, "leftHip"), 0, STILL_S);
+  expect(seated.stature?.trunk).toBe(null);
 });

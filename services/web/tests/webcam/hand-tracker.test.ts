@@ -2,7 +2,7 @@ import { describe, expect, test } from "vitest";
 import type { HandState } from "../../src/input/body-input";
 import { STILL_S } from "../../src/webcam/calibration";
 import { FORGET_S, HandTracker, type TrackedHands } from "../../src/webcam/hand-tracker";
-import type { DetectedBody } from "../../src/webcam/landmark";
+import { type DetectedBody, LANDMARK, LANDMARK_STRIDE } from "../../src/webcam/landmark";
 import { HOLD_S } from "../../src/webcam/visibility-gate";
 import { ASPECT, type DetectionOptions, detect, hide, trueReach } from "./detected-body";
 import { ARMS_ASIDE, ARMS_DOWN, LEFT_UP } from "./poses";
@@ -74,6 +74,23 @@ describe("hands", () => {
     const session = calibrated({ distance: 3.5 });
     const { hands } = session.show(detect(LEFT_UP, { distance: 2.6 }), 6);
     expectReach(hands.right, trueReach(LEFT_UP, "right"));
+  });
+
+  test("shoulders that become narrower with raised arms do not change the size", () => {
+    for (const hidden of [[], ["leftHip"]] as const) {
+      const session = new Session();
+      const narrow = (body: DetectedBody) => {
+        for (const side of ["left", "right"] as const) {
+          const at = LANDMARK[`${side}Shoulder`] * LANDMARK_STRIDE;
+          body.image[at] = 0.5 + (body.image[at] - 0.5) * 0.85;
+        }
+        return body;
+      };
+      session.show(hide(detect(ARMS_DOWN, { distance: 3 }), 0.1, ...hidden), STILL_S + 0.5);
+      const raised = () => narrow(hide(detect(LEFT_UP, { distance: 3 }), 0.1, ...hidden));
+      const { hands } = session.show(raised(), 1.5);
+      expect(hands.left?.[1]).toBeCloseTo(trueReach(LEFT_UP, "left")[1], 1);
+    }
   });
 
   test("do not jump when the person moves at once", () => {

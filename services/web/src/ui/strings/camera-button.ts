@@ -15,29 +15,26 @@ export function cameraSupport(
   return isSecure ? "unavailable" : "needs HTTPS";
 }
 
-export interface CameraButton {
-  readonly element: HTMLElement;
-  /** Show whether the camera is on. */
-  setActive(isActive: boolean): void;
-}
-
+/**
+ * Create the button, or the reason in place of it. `toggle` switches the camera, tells whether it is on, and rejects if
+ * its code cannot be loaded.
+ */
 export function createCameraButton(
-  onClick: () => void,
+  toggle: (onChange: (isOn: boolean) => void) => Promise<void>,
   support = cameraSupport(navigator.mediaDevices, isSecureContext),
-): CameraButton {
-  if (support !== "available") {
-    const reason = element("p", { class: "strings-hint", hidden: support === "unavailable" });
-    if (support === "needs HTTPS") setText(reason, translate("Browsers allow the camera only on pages with HTTPS."));
-    return { element: reason, setActive: () => undefined };
-  }
+): HTMLElement {
+  const reason = element("p", { class: "strings-hint", role: "status", hidden: support === "unavailable" });
+  if (support === "needs HTTPS") setText(reason, translate("Browsers allow the camera only on pages with HTTPS."));
+  if (support !== "available") return reason;
   const label = element("span");
-  const button = element(
-    "button",
-    { class: "text-button camera-button", type: "button", onClick },
-    icon("camera"),
-    label,
-  );
-  const setActive = (isActive: boolean) => setText(label, translate(isActive ? "Stop the camera" : "Use my camera"));
-  setActive(false);
-  return { element: button, setActive };
+  const show = (isOn: boolean) => setText(label, translate(isOn ? "Stop the camera" : "Use my camera"));
+  show(false);
+  const onClick = () => {
+    setText(reason, "");
+    toggle(show).catch(() =>
+      setText(reason, translate("The camera control could not be loaded. Check your connection, then try again")),
+    );
+  };
+  const attributes = { class: "text-button camera-button", type: "button", onClick };
+  return element("div", {}, element("button", attributes, icon("camera"), label), reason);
 }

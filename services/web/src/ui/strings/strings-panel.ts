@@ -14,8 +14,7 @@ import {
   performerCount,
 } from "../limb-state";
 import { createPanel, type Panel } from "../panel";
-import { createCameraButton } from "./camera-button";
-import { createDirectionPad } from "./direction-pad";
+import type { DirectionPad } from "./direction-pad";
 import { createNextPerformerButton, createPerformerChooser } from "./performer-chooser";
 
 const NOTICE_DURATION_MS = 5_000;
@@ -27,8 +26,8 @@ export interface StringsPanel {
   readonly dock: HTMLElement;
   /** Show a short message about an input that was not applied as sent. */
   notice(text: string): void;
-  /** Show whether the camera controls the hands. */
-  setCameraActive(isActive: boolean): void;
+  /** Load what is not needed until the panel opens. */
+  load(): void;
 }
 
 export interface StringsActions {
@@ -43,8 +42,8 @@ export interface StringsActions {
   nextDancer(): void;
   /** Report that a button for an input went down or came up. */
   press(input: DigitalInput, down: boolean): void;
-  /** Control the hands by camera, or stop it. */
-  useCamera(): void;
+  /** Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded. */
+  useCamera(onChange: (isOn: boolean) => void): Promise<void>;
 }
 
 /** Action of a limb's button. */
@@ -79,15 +78,20 @@ export function createStringsPanel(
       onClick: () => actions[action](limbOf(limb)),
       ...focusEvents(limb),
     });
-    const pad = createDirectionPad(limb, actions.press);
+    let pad: DirectionPad | null = null;
+    let isMoved = false;
     const row = element(
       "li",
       {},
       glyph,
       element("span", {}, element("b", {}, translate(LIMB_NAMES[limb])), state),
       button,
-      pad.element,
     );
+    const setPad = (created: DirectionPad) => {
+      pad = created;
+      row.append(pad.element);
+      pad.setVisible(isMoved);
+    };
     const render = (limbState: LimbState, ready: boolean) => {
       const { holder, selected } = limbState;
       const mine = holder?.mine ?? false;
@@ -111,9 +115,10 @@ export function createStringsPanel(
       glyph.disabled = !mine || !ready;
       setAttribute(glyph, "aria-pressed", mine ? String(selected) : null);
       // Also while disconnected: the limb is claimed again on reconnection, and a button that is held keeps working.
-      pad.setVisible(mine && selected);
+      isMoved = mine && selected;
+      pad?.setVisible(isMoved);
     };
-    return { limb, row, render };
+    return { limb, row, render, setPad };
   });
   const discs = LIMB_ORDER.map((limb) => {
     const name = element("span", { hidden: true, dir: "auto" });
@@ -140,7 +145,7 @@ export function createStringsPanel(
     { class: "text-button", type: "button", onClick: actions.keys },
     translate("Touch, gamepad and keys"),
   );
-  const camera = createCameraButton(actions.useCamera);
+  let loading: Promise<unknown> | null = null;
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
   panel.body.append(
@@ -148,7 +153,6 @@ export function createStringsPanel(
     element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)),
     hint,
     notice,
-    camera.element,
     keys,
   );
   const dock = element(
@@ -162,7 +166,15 @@ export function createStringsPanel(
   return {
     panel,
     dock,
-    setCameraActive: camera.setActive,
+    load() {
+      loading ??= import("./strings-controls").then(
+        ({ createCameraButton, createDirectionPad }) => {
+          for (const { limb, setPad } of rows) setPad(createDirectionPad(limb, actions.press));
+          keys.before(createCameraButton(actions.useCamera));
+        },
+        () => (loading = null),
+      );
+    },
     notice(text) {
       clearTimeout(noticeTimer);
       setText(notice, text);
