@@ -143,6 +143,10 @@ soak: setup
 bench-page: setup
 	@cd services/web && node --input-type=module --eval 'import { runnerImport } from "vite"; await runnerImport("./tests/bench/page.ts")' -- $(ARGUMENTS)
 
+# benchmark the control by webcam in Chromium, about four minutes (ARGUMENTS="--seconds 20")
+bench-webcam: setup
+	@cd services/web && node --input-type=module --eval 'import { runnerImport } from "vite"; await runnerImport("./tests/bench/webcam.ts")' -- $(ARGUMENTS)
+
 bench-%: setup
 	$(BIN)/python -m tests.bench.$(subst -,_,$*) $(ARGUMENTS)
 

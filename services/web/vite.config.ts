@@ -1,5 +1,6 @@
 import { defineConfig } from "vitest/config";
 import { preloadScripts, startupChunks } from "./vite.chunks.ts";
+import { poseModules } from "./vite.pose.ts";
 import { reducedRenderer } from "./vite.renderer.ts";
 import { avatarShaders } from "./vite.shaders.ts";
 import { threeModules } from "./vite.three.ts";
@@ -20,6 +21,8 @@ export default defineConfig({
     // three.js is one chunk of about 600 kB that loads after the page has been drawn.
     chunkSizeWarningLimit: 700,
   },
+  // The detector's worker imports modules, as the page does.
+  worker: { format: "es", plugins: () => [poseModules] },
   // The prior and the constants are imported from proto/.
   server: {
     fs: { allow: [".", "../../proto"] },

@@ -1,6 +1,7 @@
 /** Controls of limbs on the page: keys, gamepad, buttons and panels act on limbs that are in the engine. */
 import type { ClaimState } from "../engine/claim-controller";
 import type { EngineCommand, LimbAction } from "../engine/message";
+import type { BodyMessage } from "../input/body-input";
 import type { PageActions } from "../input/command-dispatcher";
 import type { PageAction } from "../input/mapping";
 import { RemoteCommands } from "../input/remote-commands";
@@ -40,12 +41,17 @@ export class LimbControls {
     this.send({ type: "performer", performer });
   }
 
+  /** Move the hands of the selected performer by those before the camera. */
+  moveBody(hands: BodyMessage, now: number): void {
+    this.send({ type: "body", hands, now });
+  }
+
   /** Run the action of a pressed control that the engine left to the page, as no limb is selected. */
   run(action: PageAction): void {
     this.actions[action]();
   }
 
-  /** Release all limbs held by keys, gamepad or buttons. Return whether the page knows of any. */
+  /** Release all limbs held by keys, gamepad, buttons or camera. Return whether the page knows of any. */
   releaseAll(): boolean {
     // Sent in any case: the engine may have claimed a limb that it has not reported yet.
     this.send({ type: "release limbs" });

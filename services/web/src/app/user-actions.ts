@@ -75,6 +75,8 @@ export function createUserActions(app: AppParts): UserActions {
       if (down) commands.press(`page ${input}`, [input], 1, performance.now());
       else commands.release(`page ${input}`, performance.now());
     },
+    useCamera: (onChange) =>
+      import("./webcam-controller").then(({ toggleWebcam }) => toggleWebcam(app.page.toast, app.limbs, onChange)),
     mapping: (mapping) => app.setMapping(mapping),
     focus: (limb) => app.limbs.focus(limb),
     dancer: (performer) => app.limbs.selectPerformer(performer),

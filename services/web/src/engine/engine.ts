@@ -170,8 +170,12 @@ export class Engine {
         // A page in the background draws no frames, so nothing else would release the inputs that were pressed.
         if (this.#settings.isHidden) velocity?.update(performance.now());
         break;
+      case "body":
+        void this.#controller?.moveHands(command.hands, this.#toLocal(command.now));
+        break;
       case "release limbs":
         velocity?.releaseAll();
+        void this.#controller?.moveHands(null, 0);
         break;
       case "limb":
         this.#onLimbAction(command.action, command.limb);

@@ -5,6 +5,7 @@
 import type { CameraKeyframe, SessionEdit } from "../client/api";
 import type { ViewerStatistics } from "../client/viewer";
 import type { Language } from "../i18n/translator";
+import type { BodyMessage } from "../input/body-input";
 import type { HandGrip, HandState, Triple } from "../input/hand";
 import type { Mapping, PageAction } from "../input/mapping";
 import type { PointerMessage } from "../input/pointer";
@@ -98,7 +99,9 @@ export type EngineCommand =
   | { type: "seek by blocks"; blocks: number; now: number }
   | { type: "pointer"; event: PointerMessage }
   | CommandMessage
-  /** Release all limbs held by keys, gamepad or buttons. */
+  /** Hands before the camera, and the time of the picture that shows them. */
+  | { type: "body"; hands: BodyMessage; now: number }
+  /** Release all limbs held by keys, gamepad, buttons or hands before the camera. */
   | { type: "release limbs" }
   | { type: "limb"; action: LimbAction; limb: number | null }
   | { type: "performer"; performer: number | "next" }

@@ -2,6 +2,7 @@
  * Stage of a playback: draws poses and strings every frame, and connects pointer and key inputs to the limbs. It runs
  * in a worker or in the page.
  */
+import type { BodyInput, BodyMessage } from "../input/body-input";
 import { CommandDispatcher, type PageActions } from "../input/command-dispatcher";
 import { LimbController } from "../input/limb-controller";
 import type { Mapping } from "../input/mapping";
@@ -62,6 +63,8 @@ export class StageController {
   readonly commands: CommandDispatcher;
   readonly #camera: ArrayLike<number> | null;
   #playback: Playback | null = null;
+  /** Hands before the camera, whose code is loaded with the first of them. */
+  #body: Promise<BodyInput> | null = null;
   #lastDrawMs = 0;
   /** Figures of the performers, other ones after each change, and the turn to the front of the first. */
   figures: readonly Figure[] = [];
@@ -120,6 +123,7 @@ export class StageController {
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;
     this.hands.puppeteer = playback?.puppeteer ?? null;
+    this.#body = null;
     this.updatePerformers();
   }
 
@@ -131,6 +135,15 @@ export class StageController {
     this.figures = performers.map((performer) => performer?.figure ?? figure);
     this.front = front;
     this.stage.setFigures(this.figures, front);
+  }
+
+  /** Follow the hands before the camera; null releases them. `now` is in milliseconds. */
+  async moveHands(hands: BodyMessage | null, now: number): Promise<void> {
+    if (!hands && !this.#body) return;
+    this.#body ??= import("../input/body-input").then(
+      ({ BodyInput }) => new BodyInput(this.hands, this.limbController, this.stage),
+    );
+    (await this.#body).handle(hands, now);
   }
 
   /** Draw the frame of local time `now` in milliseconds. `focusedLimb` is the limb whose control has the focus. */

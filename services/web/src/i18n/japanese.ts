@@ -255,6 +255,37 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Nobody is asking for your strings": "あなたの糸を希望している人はいません",
   "Drag a ring on the stage, or press {first} to {last}.": "舞台の輪をドラッグするか、{first}〜{last}を押します。",
   "Touch, gamepad and keys": "タッチ・ゲームパッド・キー",
+  // camera
+  "Use my camera": "カメラで手を動かす",
+  "Stop the camera": "カメラを止める",
+  "Browsers allow the camera only on pages with HTTPS.": "カメラを使えるのは、HTTPSで開いたページだけです。",
+  "The camera control could not be loaded. Check your connection, then try again":
+    "カメラ操作を読み込めませんでした。接続を確かめて、もう一度お試しください",
+  Camera: "カメラ",
+  "Show the picture of the camera": "カメラの映像を表示",
+  "Calibrate again": "測り直す",
+  "Try again": "もう一度試す",
+  "Allow the camera in your browser. Its picture never leaves this page.":
+    "ブラウザでカメラを許可してください。映像がこのページの外に送られることはありません。",
+  "Loading the detector: {share}": "検出器を読み込み中：{share}",
+  "Bring your head and shoulders into the picture": "頭と肩が映るようにしてください",
+  "Keep still for a moment": "しばらく動かないでください",
+  "Raise your hands into the picture": "手を映る位置まで上げてください",
+  "Your hands move the hands on the stage": "あなたの手が舞台の手を動かします",
+  "The camera was switched off while this page was hidden": "ページが隠れている間にカメラを切りました",
+  "The browser may not use the camera": "カメラの使用が許可されていません",
+  "Allow the camera for this page, at the symbol beside the address, then try again.":
+    "アドレスの横の記号からこのページにカメラを許可して、もう一度お試しください。",
+  "There is no camera": "カメラがありません",
+  "Connect a camera, then try again.": "カメラをつないで、もう一度お試しください。",
+  "The camera is in use": "カメラは使用中です",
+  "Close the other program or page that uses it, then try again.":
+    "カメラを使っているほかのプログラムやページを閉じて、もう一度お試しください。",
+  "The camera has stopped": "カメラが止まりました",
+  "Check that it is connected, then try again.": "つながっているか確かめて、もう一度お試しください。",
+  "Your hands cannot be detected here": "手を検出できません",
+  "The detector could not be loaded or run. Check your connection, then try again, or use another browser.":
+    "検出器を読み込めないか、実行できません。接続を確かめてもう一度お試しになるか、別のブラウザをお使いください。",
   right: "右",
   left: "左",
   up: "上",

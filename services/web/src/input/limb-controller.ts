@@ -10,8 +10,11 @@ import type { Stage } from "../stage/stage";
 import { limbWithinPerformer, MAX_LIMBS, performerOfLimb } from "../wire/limbs";
 import { orientationOf, positionOf, solveThighAngle, toChestFrame, toShoulderFrame } from "./target-frame";
 
-/** Source that holds a limb: a pointer or a hand that it follows, or inputs (keys, gamepad, buttons) that set its velocity. */
-export type HoldSource = "pointer" | "velocity";
+/**
+ * Source that holds a limb: a pointer or a hand in VR that it follows, inputs (keys, gamepad, buttons) that set its
+ * velocity, or a hand before the camera.
+ */
+export type HoldSource = "pointer" | "velocity" | "camera";
 
 export class LimbController {
   /** Called when the limbs held here change. */
@@ -84,19 +87,8 @@ export class LimbController {
     // In the measures of the streamed figure, whichever performer is shown.
     const handleTarget = performer.toStreamedHandle(limbIndex, to, new Vector3());
     const side = limbIndex % 2 === 0 ? "l" : "r";
-    if (limbIndex < 2) {
-      const wrist = performer.joint(`${side}_wrist`);
-      const fingers = jointTip(performer, `${side}_wrist`).applyMatrix4(wrist);
-      const tip = handleTarget.add(fingers.sub(handlePosition(performer, limbIndex, new Vector3())));
-      const shoulder = positionOf(performer.joint(`${side}_shoulder`));
-      const { x, y, z } = toShoulderFrame(
-        tip,
-        shoulder,
-        orientationOf(performer.joint("vl5")),
-        armLength(performer, side),
-      );
-      this.#puppeteer?.target(limb, x, y, z);
-    } else {
+    if (limbIndex < 2) this.pullHand(limb, handleTarget);
+    else {
       const hip = positionOf(performer.joint(`${side}_hip`));
       const angle = solveThighAngle(
         handleTarget,
@@ -106,6 +98,21 @@ export class LimbController {
       );
       this.#puppeteer?.target(limb, angle, 0, 0);
     }
+  }
+
+  /** Pull the handle of a streamed figure's hand to a world position. */
+  pullHand(limb: number, handle: Vector3): void {
+    const performer = this.#stage.performers[performerOfLimb(limb)];
+    if (!performer || this.#sources[limb] === null) return;
+    const limbIndex = limbWithinPerformer(limb);
+    const side = limbIndex === 0 ? "l" : "r";
+    const wrist = performer.joint(`${side}_wrist`);
+    const fingers = jointTip(performer, `${side}_wrist`).applyMatrix4(wrist);
+    const tip = fingers.sub(handlePosition(performer, limbIndex, new Vector3())).add(handle);
+    const shoulder = positionOf(performer.joint(`${side}_shoulder`));
+    const chest = orientationOf(performer.joint("vl5"));
+    const { x, y, z } = toShoulderFrame(tip, shoulder, chest, armLength(performer, side));
+    this.#puppeteer?.target(limb, x, y, z);
   }
 
   /** Move a limb at -1..1 of full speed to the right, up and towards the audience; legs use `up` alone. */

@@ -107,6 +107,7 @@ export function createPage(root: HTMLElement, actions: UserActions): Page {
       transport.setExpanded(name, open);
       if (name === "line" && open) link.load();
       if (name === "library" && open) library.load();
+      if (name === "strings" && open) strings.load();
       strings.dock.hidden = panels.isOpen("strings") || panels.isSheetOpen;
       occupied.invalidate();
       actions.reframe();

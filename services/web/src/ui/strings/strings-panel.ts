@@ -14,7 +14,7 @@ import {
   performerCount,
 } from "../limb-state";
 import { createPanel, type Panel } from "../panel";
-import { createDirectionPad } from "./direction-pad";
+import type { DirectionPad } from "./direction-pad";
 import { createNextPerformerButton, createPerformerChooser } from "./performer-chooser";
 
 const NOTICE_DURATION_MS = 5_000;
@@ -26,6 +26,8 @@ export interface StringsPanel {
   readonly dock: HTMLElement;
   /** Show a short message about an input that was not applied as sent. */
   notice(text: string): void;
+  /** Load what is not needed until the panel opens. */
+  load(): void;
 }
 
 export interface StringsActions {
@@ -40,6 +42,8 @@ export interface StringsActions {
   nextDancer(): void;
   /** Report that a button for an input went down or came up. */
   press(input: DigitalInput, down: boolean): void;
+  /** Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded. */
+  useCamera(onChange: (isOn: boolean) => void): Promise<void>;
 }
 
 /** Action of a limb's button. */
@@ -74,15 +78,20 @@ export function createStringsPanel(
       onClick: () => actions[action](limbOf(limb)),
       ...focusEvents(limb),
     });
-    const pad = createDirectionPad(limb, actions.press);
+    let pad: DirectionPad | null = null;
+    let isMoved = false;
     const row = element(
       "li",
       {},
       glyph,
       element("span", {}, element("b", {}, translate(LIMB_NAMES[limb])), state),
       button,
-      pad.element,
     );
+    const setPad = (created: DirectionPad) => {
+      pad = created;
+      row.append(pad.element);
+      pad.setVisible(isMoved);
+    };
     const render = (limbState: LimbState, ready: boolean) => {
       const { holder, selected } = limbState;
       const mine = holder?.mine ?? false;
@@ -106,9 +115,10 @@ export function createStringsPanel(
       glyph.disabled = !mine || !ready;
       setAttribute(glyph, "aria-pressed", mine ? String(selected) : null);
       // Also while disconnected: the limb is claimed again on reconnection, and a button that is held keeps working.
-      pad.setVisible(mine && selected);
+      isMoved = mine && selected;
+      pad?.setVisible(isMoved);
     };
-    return { limb, row, render };
+    return { limb, row, render, setPad };
   });
   const discs = LIMB_ORDER.map((limb) => {
     const name = element("span", { hidden: true, dir: "auto" });
@@ -135,6 +145,7 @@ export function createStringsPanel(
     { class: "text-button", type: "button", onClick: actions.keys },
     translate("Touch, gamepad and keys"),
   );
+  let loading: Promise<unknown> | null = null;
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
   panel.body.append(
@@ -155,6 +166,15 @@ export function createStringsPanel(
   return {
     panel,
     dock,
+    load() {
+      loading ??= import("./strings-controls").then(
+        ({ createCameraButton, createDirectionPad }) => {
+          for (const { limb, setPad } of rows) setPad(createDirectionPad(limb, actions.press));
+          keys.before(createCameraButton(actions.useCamera));
+        },
+        () => (loading = null),
+      );
+    },
     notice(text) {
       clearTimeout(noticeTimer);
       setText(notice, text);

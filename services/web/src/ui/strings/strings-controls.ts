@@ -1,0 +1,3 @@
+/** Controls of the strings panel that are loaded when it opens. */
+export { createCameraButton } from "./camera-button";
+export { createDirectionPad } from "./direction-pad";
