@@ -29,9 +29,18 @@ SHRINK_TIME_CONSTANT_US = 10_000_000
 class PlayoutDelay:
     """Play-out delay of one viewer."""
 
-    def __init__(self, initial_us: float = 0.0, on_time_quantile: float = ON_TIME_QUANTILE) -> None:
-        """Begin with a delay of `initial_us`; later `on_time_quantile` of the last messages arrive in time."""
+    def __init__(
+        self,
+        initial_us: float = 0.0,
+        on_time_quantile: float = ON_TIME_QUANTILE,
+        margin_us: float = DELAY_MARGIN_US,
+    ) -> None:
+        """Begin with a delay of `initial_us`.
+
+        Later `on_time_quantile` of the last messages arrive in time, by at least `margin_us`.
+        """
         self._quantile = on_time_quantile
+        self._margin_us = margin_us
         self._lateness: deque[float] = deque(maxlen=LATENESS_SAMPLES)
         # the delay in use was `_start` at local time `_started_at`, and approaches `_target`
         self._start = initial_us
@@ -46,7 +55,7 @@ class PlayoutDelay:
         self._lateness.append(lateness)
         if len(self._lateness) < MIN_LATENESS_SAMPLES:
             return
-        required = sorted(self._lateness)[math.ceil(self._quantile * len(self._lateness)) - 1] + DELAY_MARGIN_US
+        required = sorted(self._lateness)[math.ceil(self._quantile * len(self._lateness)) - 1] + self._margin_us
         self._start = self.at(local)
         self._started_at = max(local, self._started_at)
         self._target = min(max(required, 0.0), MAX_DELAY_US)

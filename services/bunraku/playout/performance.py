@@ -34,7 +34,9 @@ MAX_AGE_US = 1_000_000
 MAX_AHEAD_US = 200_000
 """Samples from further in the future are ignored: the performer's clock is not synchronised."""
 MAX_SAMPLES = 512
-INITIAL_LATENESS_US = 13_000
+MARGIN_US = 4_000
+"""Added to that quantile: a later sample is replaced by the pose before it, for one frame."""
+INITIAL_LATENESS_US = 8_000
 """Assumed lateness of samples until enough have arrived to know it."""
 
 
@@ -58,7 +60,7 @@ class Performance:
         """
         self._times: list[int] = []
         self._samples: list[Pose] = []
-        self._delay = PlayoutDelay(1e6 / fps + INITIAL_LATENESS_US, ON_TIME_QUANTILE)
+        self._delay = PlayoutDelay(1e6 / fps + INITIAL_LATENESS_US, ON_TIME_QUANTILE, MARGIN_US)
         self._rest_height = float(figure.offsets[0, 1])
         self._rest_rotations = np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
         self._shown: Pose = np.array([0.0, self._rest_height, 0.0]), self._rest_rotations
