@@ -61,7 +61,7 @@ async function startCamera(page: Page): Promise<void> {
 
 describeInBrowser("webcam", { server: "open", browser: fakeCamera(FILM) }, ({ open }) => {
   beforeAll(() => {
-    const times = [...Array(15).fill(ARMS_DOWN_S), ...Array(30).fill(ARMS_ASIDE_S)];
+    const times = [...Array(30).fill(ARMS_DOWN_S), ...Array(60).fill(ARMS_ASIDE_S)];
     writeFilm(FILM, { times, view: { distance: 2.2, height: 1.15, fov: 45 } });
   });
   afterAll(() => rmSync(FILM, { force: true }));

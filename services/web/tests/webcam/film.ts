@@ -6,7 +6,7 @@ import { Person } from "./person";
 import { drawPicture, type Picture } from "./rasteriser";
 
 export const [FILM_WIDTH, FILM_HEIGHT] = [640, 480];
-export const FILM_FPS = 15;
+export const FILM_FPS = 30;
 /** Bits of the number of a picture, drawn as squares in its upper left corner, the lowest first. */
 export const NUMBER_BITS = 10;
 export const SQUARE_PX = 16;
@@ -20,7 +20,7 @@ export interface CameraView {
 }
 
 export interface FilmOptions {
-  /** Time of the performance that each picture shows, in seconds. */
+  /** Time of the performance that each picture shows, in seconds. A repeated picture is drawn once. */
   readonly times: readonly number[];
   readonly view: CameraView;
 }
