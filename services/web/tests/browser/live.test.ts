@@ -155,11 +155,12 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
     });
   });
 
-  test("the performer of the package is seen, and its motion is in the library at the end", async () => {
+  test("the performer of the package is seen, reconnects, and leaves a motion", async () => {
     const page = await fixture.open("", { reducedMotion: "reduce" });
     await waitForFirstPose(page);
+    const proxy = await fixture.proxy();
     const performer = await Performer.open({
-      access: new Access(fixture.url),
+      access: new Access(proxy.url),
       name: "Chie",
       session: fixture.session!,
       place: [1, 0, 0],
@@ -177,6 +178,11 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
     onTestFinished(() => clearInterval(timer));
     await waitForPerformers(page, 2);
     await page.locator(".live").getByText("Chie").waitFor();
+    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(0.05);
+
+    const opened = new Promise((resolve) => performer.addEventListener("open", resolve, { once: true }));
+    proxy.cutWebSockets(/performers/);
+    await opened;
     await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(0.05);
 
     await performer.close();
