@@ -6,8 +6,9 @@ import { threeModules } from "./vite.three.ts";
 /** Entry points, served as `embed/NAME.js`. Their chunks have a content hash in their names and are cached forever. */
 const ENTRIES = { "bunraku-stage": "src/element/define.ts", bunraku: "src/package.ts" };
 
-/** Modules for rendering and for the examples page, which the element does not need at startup. */
-const DEFERRED = /\/node_modules\/three\/|\/src\/(stage\/|package\.ts|ui\/theme\.ts)|\/examples[./]/;
+/** Modules for rendering, for custom pages and for the examples page, which the element does not need at startup. */
+const DEFERRED =
+  /\/node_modules\/three\/|\/src\/(stage\/|client\/performer\.ts|package\.ts|ui\/theme\.ts)|\/examples[./]/;
 
 export default defineConfig({
   plugins: [threeModules],

@@ -13,7 +13,8 @@ const { dependencies, devDependencies, engines, version } = own;
 const manifest = {
   name: "bunraku",
   version,
-  description: "A streamed puppet whose hands and legs the audience controls: element, viewer, puppeteer and stage.",
+  description:
+    "A streamed puppet whose hands and legs the audience controls: element, viewer, puppeteer, performer and stage.",
   license: "Apache-2.0",
   type: "module",
   engines,

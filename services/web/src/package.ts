@@ -1,6 +1,8 @@
-/** Public interface of the npm package `bunraku`: element, viewer, puppeteer, stage, and wire format decoders. */
+/** Public interface of the npm package `bunraku`: element, viewer, puppeteer, performer, stage, and wire format decoders. */
 
 export { Access, type Role, tabToken } from "./client/access";
+export type { LivePerformer, PerformerFigure } from "./client/api";
+export { Performer, type PerformerOptions } from "./client/performer";
 export { ProblemError } from "./client/problem";
 export { Puppeteer, type PuppeteerOptions } from "./client/puppeteer";
 export { type Presence, type Timeline, Viewer, type ViewerOptions, type ViewerStatistics } from "./client/viewer";

@@ -13,7 +13,8 @@ const COMPILER = join(WEB, "node_modules/typescript/bin/tsc");
 
 /** Program that uses the package's types. A missing type would make a `@ts-expect-error` fail. */
 const PROGRAM = `
-import { Access, decodeMotionBlock, JOINTS, MotionTrack, pack, parseStageAddress, Puppeteer, restPose } from "bunraku";
+import { Access, decodeMotionBlock, JOINTS, MotionTrack, pack, parseStageAddress, Performer } from "bunraku";
+import { Puppeteer, restPose } from "bunraku";
 import { Stage, unpack, Viewer, type Message, type Placement, type Pose, type StageAddress } from "bunraku";
 import type { StagedPerformer, ThemePreference } from "bunraku";
 import "bunraku/element";
@@ -23,6 +24,12 @@ const access = new Access("https://stage.example", null);
 const viewer = new Viewer({ url: "wss://stage.example/v1/sessions/one/stream", access });
 const puppeteer = new Puppeteer({ url: null, viewer });
 puppeteer.target(0, 0.1, 0.2, 0.3);
+export async function perform(): Promise<void> {
+  const performer = await Performer.open({ access, name: "Aiko", place: [1, 0, 0] });
+  const isSent: boolean = performer.frame([0, 0.9, 0], restPose().rotations);
+  console.log(isSent, performer.session, performer.motion);
+  await performer.close();
+}
 const pose: Pose | null = viewer.poseAt(0);
 export const angles: Float64Array = (pose ?? restPose()).rotations;
 export const count: number = JOINTS.length;

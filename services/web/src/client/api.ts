@@ -129,6 +129,50 @@ export function recordSession(session: string, recording: Recording = {}): Promi
   return requestJson("POST", `/v1/sessions/${encodeURIComponent(session)}/recordings`, recording) as Promise<Motion>;
 }
 
+/** Lengths of a figure in metres by joint name: each joint from its parent, and the tips from their joints. */
+export interface PerformerFigure {
+  offsets: Readonly<Record<string, readonly [number, number, number]>>;
+  tips: Readonly<Record<string, readonly [number, number, number]>>;
+}
+
+/** Request to bring a live performer on a stage. */
+export interface NewPerformer {
+  name?: string;
+  /** Samples per second that will be sent, 10..240; 60 by default. */
+  fps?: number;
+  /** The standard figure by default. */
+  figure?: PerformerFigure;
+  /** Id of the session; by default a new one is created. */
+  session?: string;
+  /** x and z in metres and the turn about y in radians; by default the next free place. */
+  place?: readonly [number, number, number];
+}
+
+/** Live performer as described by the server. */
+export interface LivePerformer {
+  id: string;
+  name: string;
+  fps: number;
+  session: string;
+  /** Number on the stage. */
+  performer: number;
+  /** Id of the motion that is in the library when the performance has ended. */
+  motion: string;
+  /** Path of the socket for samples. */
+  input: string;
+}
+
+/** Bring a live performer on a stage. */
+export function createPerformer(performer: NewPerformer, access = pageAccess): Promise<LivePerformer> {
+  return requestJson("POST", "/v1/performers", performer, access) as Promise<LivePerformer>;
+}
+
+/** End a performance, also while the page is unloaded. */
+export async function endPerformer(id: string, access = pageAccess): Promise<void> {
+  const url = `${access.server}/v1/performers/${encodeURIComponent(id)}`;
+  await access.request(url, { method: "DELETE", keepalive: true });
+}
+
 /** Link for viewers, relative to the page's URL, and the time at which it expires (RFC 3339). */
 export interface ShareLink {
   link: string;

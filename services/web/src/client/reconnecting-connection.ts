@@ -89,8 +89,13 @@ export class ReconnectingConnection {
 
   /** Send a message. Return false if not connected. */
   send(message: ViewerMessage): boolean {
+    return this.sendBytes(packViewerMessage(message));
+  }
+
+  /** Send an encoded message, of a type that `send` does not encode. Return false if not connected. */
+  sendBytes(message: Uint8Array<ArrayBuffer>): boolean {
     if (!this.socket || !this.isOpen) return false;
-    this.socket.send(packViewerMessage(message));
+    this.socket.send(message);
     this.startSilenceTimer();
     return true;
   }

@@ -1,20 +1,12 @@
 /** Periodic messages of a viewer: clock pings and reports (`proto/messages.md`, 3.6 and 3.8). */
 
 import type { Ping, Report } from "../wire/messages";
+import { PingSender } from "./ping-sender";
 
-/** Pings of a new connection that are sent at the shorter interval. */
-const INITIAL_PINGS = 8;
-const INITIAL_PING_INTERVAL_MS = 60;
-const PING_INTERVAL_MS = 2_000;
 const REPORT_INTERVAL_MS = 1_000;
-/** Pings in flight: on a stalled link their answers would use all of its bandwidth. */
-const MAX_UNANSWERED_PINGS = 2;
 
 /** Sender of pings and reports over the current connection. */
-export class ViewerReporter {
-  private pingTimer: ReturnType<typeof setTimeout> | undefined;
-  private pingCount = 0;
-  private answeredCount = 0;
+export class ViewerReporter extends PingSender {
   private readonly reportTimer: ReturnType<typeof setInterval>;
 
   /**
@@ -22,58 +14,17 @@ export class ViewerReporter {
    * @param now local clock, milliseconds
    * @param makeReport function that returns the current report
    */
-  constructor(
-    private readonly send: (message: Ping | Report) => boolean,
-    private readonly now: () => number,
-    makeReport: () => Omit<Report, "name">,
-  ) {
+  constructor(send: (message: Ping | Report) => boolean, now: () => number, makeReport: () => Omit<Report, "name">) {
+    super(send, now);
     this.reportTimer = setInterval(
       () => this.isLimitReached || send({ name: "Report", ...makeReport() }),
       REPORT_INTERVAL_MS,
     );
   }
 
-  /** Start anew on a new connection. */
-  restart(): void {
-    this.pause();
-    this.sendPing();
-  }
-
-  /** Record the answer to a ping and to all before it. */
-  onPong(sequence: number): void {
-    const { isLimitReached: wasLimitReached } = this;
-    this.answeredCount = Math.max(this.answeredCount, sequence + 1);
-    if (wasLimitReached && this.pingTimer === undefined) this.sendPing();
-  }
-
-  /** Stop until the next connection. */
-  pause(): void {
-    clearTimeout(this.pingTimer);
-    this.pingTimer = undefined;
-    this.pingCount = this.answeredCount = 0;
-  }
-
   /** Stop for good. */
   close(): void {
     this.pause();
     clearInterval(this.reportTimer);
-  }
-
-  private get isLimitReached(): boolean {
-    return this.pingCount - this.answeredCount >= MAX_UNANSWERED_PINGS;
-  }
-
-  private sendPing(): void {
-    this.pingTimer = undefined;
-    if (
-      this.isLimitReached ||
-      !this.send({ name: "Ping", sequence: this.pingCount, sent: Math.round(this.now() * 1000) })
-    )
-      return;
-    this.pingCount++;
-    this.pingTimer = setTimeout(
-      () => this.sendPing(),
-      this.pingCount < INITIAL_PINGS ? INITIAL_PING_INTERVAL_MS : PING_INTERVAL_MS,
-    );
   }
 }

@@ -13,7 +13,7 @@ const MAX_INDEX_BYTES = 3;
 const FIXED_MESSAGE_BYTES = 32;
 const SAMPLE_BYTES = 136;
 /** Bound of each coordinate of a sample's root. */
-const MAX_ROOT_M = 100;
+export const MAX_ROOT_M = 100;
 const SAMPLE_ROOT_AT = 16;
 const SAMPLE_ROTATIONS_AT = 28;
 

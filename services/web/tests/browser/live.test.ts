@@ -1,6 +1,10 @@
 /** Live performers: shown, named, controlled by the page, and gone again; and the guide for those who become one. */
 import type { Page } from "playwright-core";
-import { expect, test } from "vitest";
+import { expect, onTestFinished, test } from "vitest";
+import { Access } from "../../src/client/access";
+import { Performer } from "../../src/client/performer";
+import { fromRotationVector } from "../../src/motion/rotation";
+import { JOINTS } from "../../src/motion/skeleton";
 import { findViolations } from "./accessibility";
 import { describeInBrowser } from "./browser-suite";
 import { createEmbeddingPage } from "./embedding-page";
@@ -149,6 +153,46 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
       const { viewer, stage } = document.querySelector("bunraku-stage")!;
       return viewer?.presence?.live === null && stage?.performers.length === 1;
     });
+  });
+
+  test("the performer of the package is seen, reconnects, and leaves a motion", async () => {
+    const page = await fixture.open("", { reducedMotion: "reduce" });
+    await waitForFirstPose(page);
+    const proxy = await fixture.proxy();
+    const performer = await Performer.open({
+      access: new Access(proxy.url),
+      name: "Chie",
+      session: fixture.session!,
+      place: [1, 0, 0],
+    });
+    const rotations = new Float64Array(4 * JOINTS.length);
+    const timer = setInterval(() => {
+      const now = performance.now();
+      const { root, vectors } = danceAt((performance.timeOrigin + now) / 1000);
+      for (let joint = 0; joint < JOINTS.length; joint++) {
+        const [x, y, z] = vectors.subarray(3 * joint);
+        fromRotationVector(rotations, 4 * joint, x, y, z);
+      }
+      performer.frame(root, rotations, now);
+    }, 1000 / 60);
+    onTestFinished(() => clearInterval(timer));
+    await waitForPerformers(page, 2);
+    await page.locator(".live").getByText("Chie").waitFor();
+    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(0.05);
+
+    const opened = new Promise((resolve) => performer.addEventListener("open", resolve, { once: true }));
+    proxy.cutWebSockets(/performers/);
+    await opened;
+    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(0.05);
+
+    await performer.close();
+    await waitForPerformers(page, 1);
+    await expect
+      .poll(async () => {
+        const { items } = await fixture.request<{ items: { id: string }[] }>("GET", "/v1/motions");
+        return items.map(({ id }) => id);
+      })
+      .toContain(performer.motion);
   });
 
   test("the guide has the command for this session", async () => {
