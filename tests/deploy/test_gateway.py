@@ -75,6 +75,9 @@ APPS: dict[str, list[str]] = {
         "/v1/sessions/{session}",
         "/v1/sessions/{session}/recordings",
         "/v1/sessions/{session}/control",
+        "/v1/performers",
+        "/v1/performers/{performer}",
+        "/v1/performers/{performer}/input",
     ],
 }
 

@@ -12,7 +12,7 @@ const DEPTH_SHARE = 0.85;
 /** Smallest distance of a hand from the camera, in arm lengths. */
 const MIN_DISTANCE = 0.2;
 /** Farthest hand, middle of the palm, in arm lengths from shoulder to wrist. */
-const MAX_REACH = 1.13;
+const MAX_STRETCH = 1.13;
 
 /**
  * Return the reach of a hand. `scale` is in heights of the picture per metre of the model (`BodyView`), `armLength` in
@@ -26,6 +26,6 @@ export function handReach({ shoulder, hand }: ArmView, side: Side, scale: number
   const outwards = side === "left" ? across("x") : -across("x");
   const up = across("y");
   const length = Math.hypot(outwards, up, forwards);
-  const share = length > MAX_REACH ? MAX_REACH / length : 1;
+  const share = length > MAX_STRETCH ? MAX_STRETCH / length : 1;
   return [outwards * share, up * share, forwards * share];
 }
