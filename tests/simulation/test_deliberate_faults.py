@@ -16,7 +16,6 @@ from bunraku.messaging.replica_registry import ReplicaRegistry
 from bunraku.session.puppeteer_roster import Puppeteer
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRegistry, session_key
 from bunraku.session.stage import Stage
-from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSession
 from bunraku.wire.messages import Message, Release, TimelineState
 from tests.conftest import REPOSITORY
@@ -70,15 +69,6 @@ def _forget_grant_at_any_release(self: Stage, puppeteer: Puppeteer, message: Mes
 _receive = Stage.receive
 
 
-def _add_viewer_with_newest_timeline(self: WatchedSession, viewer: ViewerConnection) -> None:
-    assert self._current is not None
-    self._current = self._timeline, self._current[1]
-    _add_viewer(self, viewer)
-
-
-_add_viewer = WatchedSession.add_viewer
-
-
 @contextmanager
 def _careless_takeover() -> Iterator[None]:
     with (
@@ -105,9 +95,6 @@ MUTATIONS: dict[str, Callable[[], AbstractContextManager[object]]] = {
     "the release of an earlier grant gives up the newer one": lambda: patch.object(
         Stage, "receive", _forget_grant_at_any_release
     ),
-    "a viewer joins with a timeline whose motion is not loaded": lambda: patch.object(
-        WatchedSession, "add_viewer", _add_viewer_with_newest_timeline
-    ),
     "an edit is not published": lambda: patch.object(Stage, "_publish_timeline", _keep_timeline),
     "an acknowledged object is not stored": lambda: patch.object(NodeObjects, "put", _do_nothing),
     "a closed stage leaves its task": lambda: patch.object(Stage, "close", _do_nothing),
@@ -121,7 +108,6 @@ FIRST_SEEDS = {
     "the record of an ended session stays": 8,
     "a session that was handed over counts as ended": 8586,
     "the release of an earlier grant gives up the newer one": 9731,
-    "a viewer joins with a timeline whose motion is not loaded": 2654,
     "an acknowledged object is not stored": 8,
 }
 """First seed that finds a fault, where known seeds before it do not; 0 for all others."""
