@@ -180,12 +180,12 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
     onTestFinished(() => clearInterval(timer));
     await waitForPerformers(page, 2);
     await page.locator(".live").getByText("Chie").waitFor();
-    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(0.05);
+    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(MAX_ANGLE_RAD);
 
     const opened = new Promise((resolve) => performer.addEventListener("open", resolve, { once: true }));
     proxy.cutWebSockets(/performers/);
     await opened;
-    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(0.05);
+    await expect.poll(async () => deviation((await shownPose(page))!)).toBeLessThan(MAX_ANGLE_RAD);
 
     await performer.close();
     await waitForPerformers(page, 1);
