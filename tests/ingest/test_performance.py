@@ -3,12 +3,15 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from pydantic import SecretStr
 
+from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.performance import ABANDONED_AFTER_S, LIFETIME_S, PerformanceOperation
+from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.performance_request import PERFORMANCE_SUBJECT, create_performer_id, performed_subject
 from bunraku.motion import rotation
@@ -19,7 +22,7 @@ from bunraku.runtime.settings import Settings
 from bunraku.storage.performance_store import PerformanceHeader
 from tests.time_limit import HANG_TIMEOUT_S
 
-HEADER = PerformanceHeader(create_performer_id("session"), "Aiko", 30.0, standard_figure(), "aiko")
+HEADER = PerformanceHeader(create_performer_id("session"), "Aiko", 30.0, standard_figure(), 10**15, "aiko")
 REST = np.array([0.0, 0.9, 0.0]), np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
 
 
@@ -33,6 +36,33 @@ class WallClock:
         import time
 
         return time.time() + self.ahead_s
+
+
+class SlowSlots(WorkerSlots):
+    """Worker slots in which the job of one performance never ends."""
+
+    def __init__(self, slow: str) -> None:
+        super().__init__()
+        self.slow = slow
+        self.is_encoding = asyncio.Event()
+
+    async def run_job(self, kind: JobKind, arguments: tuple[Any, ...], *rest: Any) -> JobResult | JobRejection:
+        if arguments[1].id == self.slow:
+            self.is_encoding.set()
+            await asyncio.Event().wait()
+        return await super().run_job(kind, arguments, *rest)
+
+
+class FailingSlots(WorkerSlots):
+    """Worker slots whose jobs crash."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.jobs = 0
+
+    async def run_job(self, *_: Any) -> JobResult | JobRejection:
+        self.jobs += 1
+        return JobRejection("Unreadable motion", "encoding this performance crashed")
 
 
 @pytest.fixture
@@ -118,7 +148,7 @@ async def test_used_up_quota_keeps_the_samples_for_a_week(
         wall_clock.ahead_s = ABANDONED_AFTER_S + 10
         await operation.make_motions()
         assert await context.catalogue.get_motion(HEADER.motion) is not None
-        other = PerformanceHeader("session-2", "Yuki", 30.0, standard_figure(), "aiko")
+        other = PerformanceHeader("session-2", "Yuki", 30.0, standard_figure(), 10**15, "aiko")
         await context.motion_store.performances.put_header(other)
         await context.motion_store.performances.put_part("session-2", "c-0", pack_sample(10**15, REST).pack())
         await operation.make_motions()
@@ -127,3 +157,42 @@ async def test_used_up_quota_keeps_the_samples_for_a_week(
         wall_clock.ahead_s = LIFETIME_S + 10
         await operation.make_motions()
         assert await context.motion_store.performances.list_performances() == {}
+
+
+async def test_performance_that_is_encoded_for_long_keeps_no_other_waiting(context: ServiceContext) -> None:
+    slots = SlowSlots(HEADER.id)
+    operation = PerformanceOperation(context, slots)
+    await perform(context)
+    other = PerformanceHeader("session-2", "Yuki", 30.0, standard_figure(), 10**15, "yuki")
+    running = asyncio.create_task(operation.run())
+    try:
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            # the operation subscribes meanwhile
+            while not slots.is_encoding.is_set():
+                context.bus.publish(PERFORMANCE_SUBJECT, HEADER.id.encode())
+                await asyncio.sleep(0.05)
+            store = context.motion_store.performances
+            await store.put_part(
+                "session-2", "c-0", b"".join(pack_sample(10**15 + k, REST).pack() for k in (0, 40_000))
+            )
+            await store.put_header(other)
+            while await context.catalogue.get_motion(other.motion) is None:
+                context.bus.publish(PERFORMANCE_SUBJECT, b"session-2")
+                await asyncio.sleep(0.05)
+    finally:
+        running.cancel()
+        await asyncio.gather(running, return_exceptions=True)
+    assert await context.catalogue.get_motion(HEADER.motion) is None
+
+
+async def test_failed_encoding_keeps_the_samples_and_is_not_repeated(
+    context: ServiceContext, wall_clock: WallClock
+) -> None:
+    slots = FailingSlots()
+    operation = PerformanceOperation(context, slots, wall_clock)
+    await perform(context)
+    wall_clock.ahead_s = ABANDONED_AFTER_S + 10
+    for _ in range(2):
+        await operation.make_motions()
+    assert slots.jobs == 1
+    assert set(await context.motion_store.performances.list_performances()) == {HEADER.id}

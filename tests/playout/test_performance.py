@@ -76,8 +76,8 @@ def test_lost_late_doubled_and_reordered_samples_do_not_make_it_jump(seed: int, 
     assert run.largest_step(since=BEGIN + 2_500_000) < 0.06
     settled = [(capture, pose) for capture, pose in run.shown if capture > BEGIN + 2_500_000]
     errors = [angle(pose, pose_of(capture)) for capture, pose in settled]
-    # at 24 samples per second two losses in a row exceed the delay, and the pose stands still for a moment
-    assert np.percentile(errors, 80) < 0.02
+    # at 24 or 30 samples per second two losses in a row exceed the delay, and the pose stands still for a moment
+    assert np.percentile(errors, 95 if fps > 30 else 80) < 0.02
 
 
 def test_delay_follows_the_lateness_of_the_samples() -> None:

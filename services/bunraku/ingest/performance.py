@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import logging
 import time
 from collections.abc import Callable
+from functools import partial
 
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.persistence import check_quota, store_motion
-from bunraku.ingest.result import JobRejection, require_result
+from bunraku.ingest.result import TOO_SHORT, JobRejection, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.lease import hold_lease
 from bunraku.messaging.performance_request import PERFORMANCE_KEY_PREFIX, PERFORMANCE_SUBJECT, performed_subject
@@ -17,15 +19,16 @@ from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.display_text import clean_text
 from bunraku.runtime.problem import ProblemError
-from bunraku.storage.performance_store import Recorded
+from bunraku.storage.performance_store import PerformanceHeader, StoredPerformance
 
 SCAN_INTERVAL_S = 60.0
 """Interval at which performances without an announced end are looked for."""
 ABANDONED_AFTER_S = 90.0
 """Age of the last change from which a performance has ended: its connection stores the header every 20 s."""
 LIFETIME_S = 7 * 86_400.0
-"""Age of the last change from which samples that could not become a motion, for lack of space, are removed."""
-MAX_ACTIVE_PERFORMANCES = 4
+"""Age of the last change from which samples that could not become a motion are removed."""
+MAX_ACTIVE_PERFORMANCES = 2
+"""Performances that are encoded at the same time; one of an hour at 240 samples per second has 120 MB."""
 JOB_TIMEOUT_S = 600.0
 """Time limit of the encoding of one performance."""
 
@@ -46,6 +49,9 @@ class PerformanceOperation:
         self._requested: set[str] = set()
         self._has_requests = asyncio.Event()
         self._slots = asyncio.Semaphore(MAX_ACTIVE_PERFORMANCES)
+        self._tasks: dict[str, asyncio.Task[None]] = {}
+        # performances whose encoding failed; a repetition would fail too
+        self._failed: set[str] = set()
 
     async def run(self) -> None:
         """Make motions of the performances that have ended, until cancelled."""
@@ -53,32 +59,38 @@ class PerformanceOperation:
         try:
             while True:
                 try:
-                    await self.make_motions()
+                    await self._start_tasks()
                 except (BackendUnavailable, ProblemError) as error:
                     _log.warning("performances not read: %s; trying again", error)
                 except Exception:
                     _log.exception("performances not read; trying again")
-                try:
+                with contextlib.suppress(TimeoutError):
                     await asyncio.wait_for(self._has_requests.wait(), SCAN_INTERVAL_S)
-                except TimeoutError:
-                    continue
         finally:
             subscription.unsubscribe()
+            for task in self._tasks.values():
+                task.cancel()
+            await asyncio.gather(*self._tasks.values(), return_exceptions=True)
 
     async def make_motions(self) -> None:
         """Make motions of all requested and abandoned performances."""
+        await self._start_tasks()
+        await asyncio.gather(*self._tasks.values())
+
+    async def _start_tasks(self) -> None:
+        """Start a task for each performance that has ended: a long one does not keep others waiting."""
         self._has_requests.clear()
         requested, self._requested = self._requested, set()
         now = self._wall_clock()
-        performances = await self._store.list_performances()
-        ended = [
-            performer
-            for performer, stored in performances.items()
-            if performer in requested or stored.modified < now - ABANDONED_AFTER_S
-        ]
-        async with asyncio.TaskGroup() as tasks:
-            for performer in ended:
-                tasks.create_task(self._make_motion_in_turn(performer))
+        for performer, stored in (await self._store.list_performances()).items():
+            has_ended = performer in requested or stored.modified < now - ABANDONED_AFTER_S
+            if has_ended and performer not in self._tasks:
+                task = asyncio.create_task(self._make_motion_in_turn(performer), name=f"performance {performer}")
+                self._tasks[performer] = task
+                task.add_done_callback(partial(self._on_done, performer))
+
+    def _on_done(self, performer: str, _: asyncio.Task[None]) -> None:
+        del self._tasks[performer]
 
     def _request(self, performer: bytes) -> None:
         self._requested.add(performer.decode("ascii", "replace"))
@@ -99,32 +111,47 @@ class PerformanceOperation:
         stored = (await self._store.list_performances()).get(performer)
         if stored is None:
             return
-        recorded = await self._store.load(performer, stored)
-        if recorded is None or stored.modified < self._wall_clock() - LIFETIME_S:
-            _log.warning("the samples of performance %s are removed: nothing says what to make of them", performer)
-        elif recorded.parts:
-            await self._encode(recorded)
-        await self._store.remove(performer, stored)
-        if recorded is not None and recorded.parts:
-            self._context.bus.publish(performed_subject(performer), recorded.header.motion.encode())
+        header = await self._read_header(performer)
+        is_lost = header is None or stored.modified < self._wall_clock() - LIFETIME_S
+        if is_lost or (header is not None and await self._store_motion(header, stored)):
+            await self._store.remove(performer, stored)
 
-    async def _encode(self, recorded: Recorded) -> None:
-        """Store the motion of a performance; one without enough samples is dropped. Raise `ProblemError`."""
-        header, context = recorded.header, self._context
+    async def _read_header(self, performer: str) -> PerformanceHeader | None:
+        try:
+            return await self._store.get_header(performer)
+        except ValueError as error:
+            _log.warning("performance %s: %s", performer, error)
+            return None
+
+    async def _store_motion(self, header: PerformanceHeader, stored: StoredPerformance) -> bool:
+        """Make and store the motion of a performance. Return whether its samples are not needed any more.
+
+        Raise `ProblemError`.
+        """
+        context = self._context
+        if header.id in self._failed:
+            return False
+        # before any work, as this is repeated until there is room
         await check_quota(context, header.subject)
+        parts = await self._store.load(header.id, stored)
+        if not any(parts):
+            return True
         async with self._worker_slots.hold(header.subject):
             outcome = await self._worker_slots.run_job(
-                JobKind.PERFORMANCE, (header.motion, header, recorded.parts), JOB_TIMEOUT_S
+                JobKind.PERFORMANCE, (header.motion, header, parts), JOB_TIMEOUT_S
             )
         if isinstance(outcome, JobRejection):
             _log.warning("performance %s has no motion: %s: %s", header.id, outcome.title, outcome.detail)
-            return
+            self._failed.add(header.id)
+            return outcome.title == TOO_SHORT
         result = require_result(outcome)
         description = {
             "name": clean_text(header.name),
             "filename": "",
-            "bytes": sum(map(len, recorded.parts)),
+            "bytes": sum(map(len, parts)),
             "source": "performed live",
             **result.description,
         }
         await store_motion(context, header.motion, result, description, header.subject)
+        context.bus.publish(performed_subject(header.id), header.motion.encode())
+        return True

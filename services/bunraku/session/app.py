@@ -47,6 +47,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         finally:
             maintenance.cancel()
             await asyncio.wait((maintenance,))
+            await performers.close()
             await sessions.close()
 
     app = FastAPI(title="Bunraku session", lifespan=lifespan, openapi_url=None)

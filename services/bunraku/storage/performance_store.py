@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import re
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import msgpack
 import numpy as np
@@ -20,6 +19,8 @@ from bunraku.storage.object_folder import TEMPORARY_MARK
 from bunraku.storage.object_storage import ObjectStorage
 
 FOLDER = "performances"
+MAX_DURATION_US = 3_600_000_000
+"""Time from the creation of a performer after which samples are not stored, and its motion ends."""
 MAX_CONCURRENT_READS = 16
 """Parts that are read at the same time."""
 _HEADER_PART = "header"
@@ -35,6 +36,8 @@ class PerformanceHeader:
     name: str
     fps: float
     figure: Figure
+    created_us: int
+    """Clock time of the creation."""
     subject: str = ""
     """Subject that stores the motion."""
 
@@ -46,18 +49,18 @@ class PerformanceHeader:
     def pack(self) -> bytes:
         """Return the header as MessagePack."""
         lengths = [part.astype("<f8").tobytes() for part in (self.figure.offsets, self.figure.tips)]
-        packed: bytes = msgpack.packb([self.id, self.name, self.fps, self.subject, *lengths])
+        packed: bytes = msgpack.packb([self.id, self.name, self.fps, self.created_us, self.subject, *lengths])
         return packed
 
     @classmethod
     def unpack(cls, data: bytes) -> PerformanceHeader:
         """Parse a header; raise ValueError."""
         try:
-            performer, name, fps, subject, *lengths = msgpack.unpackb(data)[:6]
+            performer, name, fps, created_us, subject, *lengths = msgpack.unpackb(data)[:7]
             offsets, tips = (np.frombuffer(part, "<f8").reshape(JOINT_COUNT, 3).copy() for part in lengths)
         except (TypeError, msgpack.UnpackException) as error:
             raise ValueError(f"not the header of a performance: {error}") from None
-        return cls(performer, name, fps, Figure(offsets, tips), subject)
+        return cls(performer, name, fps, Figure(offsets, tips), created_us, subject)
 
 
 @dataclass(slots=True)
@@ -66,13 +69,6 @@ class StoredPerformance:
 
     parts: list[str] = field(default_factory=list)
     modified: float = 0.0
-
-
-class Recorded(NamedTuple):
-    """Header of a performance, and its parts in no particular order."""
-
-    header: PerformanceHeader
-    parts: list[bytes]
 
 
 class PerformanceStore:
@@ -110,14 +106,8 @@ class PerformanceStore:
                     performance.modified = max(performance.modified, one.modified)
         return found
 
-    async def load(self, performer: str, performance: StoredPerformance) -> Recorded | None:
-        """Return the samples of a performance; None without a readable header."""
-        try:
-            header = await self.get_header(performer)
-        except ValueError:
-            header = None
-        if header is None:
-            return None
+    async def load(self, performer: str, performance: StoredPerformance) -> list[bytes]:
+        """Return the parts of a performance."""
         slots = asyncio.Semaphore(MAX_CONCURRENT_READS)
 
         async def read(part: str) -> bytes:
@@ -125,7 +115,7 @@ class PerformanceStore:
                 return await self._objects.get(_path(performer, part)) or b""
 
         names = sorted(part for part in performance.parts if part != _HEADER_PART)
-        return Recorded(header, await asyncio.gather(*map(read, names)))
+        return await asyncio.gather(*map(read, names))
 
     async def remove(self, performer: str, performance: StoredPerformance) -> None:
         """Remove a performance, its header last."""

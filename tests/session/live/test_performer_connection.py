@@ -20,7 +20,7 @@ from bunraku.session.live.performer_connection import (
     PerformerConnection,
 )
 from bunraku.storage.motion_store import MotionStore
-from bunraku.storage.performance_store import PerformanceHeader
+from bunraku.storage.performance_store import MAX_DURATION_US, PerformanceHeader
 from bunraku.websocket.connection import WebSocketConnection
 from bunraku.websocket.frame import Opcode
 from bunraku.wire.live import Sample
@@ -29,7 +29,7 @@ from tests.raw_client import client_frame
 from tests.stream.fake_transport import FakeTransport
 from tests.time_limit import HANG_TIMEOUT_S
 
-HEADER = PerformanceHeader("session-1", "Aiko", 60.0, standard_figure())
+HEADER = PerformanceHeader("session-1", "Aiko", 60.0, standard_figure(), 10**15)
 REST = np.array([0.0, 0.9, 0.0]), np.tile(rotation.IDENTITY, (JOINT_COUNT, 1))
 
 
@@ -61,6 +61,7 @@ class Performer:
         self.connection = PerformerConnection(self.stage, HEADER, self.store, lambda: self.now)
         self.socket = WebSocketConnection(self.transport, self.connection, set(), lambda: self.now, PERFORMER_FRAMES)
         self.connection.open(self.socket)
+        self.storing = asyncio.create_task(self.connection.store_samples())
 
     def receive(self, message: Any) -> None:
         self.socket.data_received(client_frame(Opcode.BINARY, message.pack()))
@@ -76,10 +77,7 @@ class Performer:
         found = await self.store.list_performances()
         if HEADER.id not in found:
             return []
-        await self.store.put_header(HEADER)
-        recorded = await self.store.load(HEADER.id, found[HEADER.id])
-        assert recorded is not None
-        data = b"".join(recorded.parts)
+        data = b"".join(await self.store.load(HEADER.id, found[HEADER.id]))
         size = Sample.LAYOUT.size
         return [Sample.unpack(data[at : at + size]) for at in range(0, len(data), size)]
 
@@ -111,6 +109,13 @@ async def test_sample_of_another_time_is_not_stored(performer: Performer) -> Non
         performer.receive(pack_sample(time, REST))
     assert [sample.sampled for sample in performer.stage.samples] == times
     assert [sample.sampled for sample in await performer.leave()] == [performer.now]
+
+
+async def test_samples_beyond_the_longest_motion_are_shown_but_not_stored(performer: Performer) -> None:
+    for performer.now in (HEADER.created_us + MAX_DURATION_US, HEADER.created_us + MAX_DURATION_US + 1):
+        performer.receive(pack_sample(performer.now, REST))
+    assert len(performer.stage.samples) == 2
+    assert [sample.sampled for sample in await performer.leave()] == [HEADER.created_us + MAX_DURATION_US]
 
 
 async def test_ping_is_answered_and_other_messages_are_ignored(performer: Performer) -> None:

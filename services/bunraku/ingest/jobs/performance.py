@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from threading import Lock
 
 import numpy as np
 
 from bunraku.codec.container import pack_motion
-from bunraku.codec.motion_encoder import EncodingGrade, encode_motion
-from bunraku.ingest.jobs.motion import FIRST_BLOCK_S, MAX_BEST_GRADE_FRAMES
-from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.jobs.encoding import describe_encoding, encode_motions
+from bunraku.ingest.result import TOO_SHORT, JobRejection, JobResult
 from bunraku.motion.skeleton import Figure, Motion
 from bunraku.playout.block_store import Pose
 from bunraku.playout.performance import MAX_GAP_US, Performance, sample_pose
 from bunraku.storage.performance_store import PerformanceHeader
 from bunraku.wire.live import Sample
 
-MAX_DURATION_US = 3_600_000_000
-"""Longest motion of a performance; what follows is left out."""
 MIN_SAMPLES = 2
 
 
@@ -33,29 +27,10 @@ def encode_performance(
     """Encode a performance from its first to its last sample; `on_progress` receives the encoded share, 0..1."""
     samples = read_samples(parts)
     if len(samples) < MIN_SAMPLES:
-        return JobRejection("Nothing to keep", f"the performance has {len(samples)} samples")
+        return JobRejection(TOO_SHORT, f"the performance has {len(samples)} samples")
     motion = sample_evenly(header.figure, header.fps, samples)
-    grade: EncodingGrade = "best" if motion.frame_count <= MAX_BEST_GRADE_FRAMES else "live"
-    progress_lock = Lock()
-
-    def report_progress(share: float) -> None:
-        with progress_lock:
-            on_progress(share)
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        encoded = encode_motion(
-            motion, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=report_progress, map_levels=pool.map
-        )
-    return JobResult(
-        pack_motion(motion_id, encoded),
-        {
-            "duration": motion.duration,
-            "fps": motion.fps,
-            "frames": motion.frame_count,
-            "blocks": encoded.track.block_count,
-            "rates": encoded.describe()["rates"],
-        },
-    )
+    (encoded,) = encode_motions([motion], on_progress)
+    return JobResult(pack_motion(motion_id, encoded), describe_encoding(motion, encoded))
 
 
 def read_samples(parts: Sequence[bytes]) -> list[Sample]:
@@ -66,8 +41,7 @@ def read_samples(parts: Sequence[bytes]) -> list[Sample]:
         for at in range(0, len(part) - size + 1, size):
             sample = Sample.unpack(part[at : at + size])
             by_time.setdefault(sample.sampled, sample)
-    samples = [by_time[time] for time in sorted(by_time)]
-    return [sample for sample in samples if sample.sampled - samples[0].sampled <= MAX_DURATION_US]
+    return [by_time[time] for time in sorted(by_time)]
 
 
 def sample_evenly(figure: Figure, fps: float, samples: Sequence[Sample]) -> Motion:

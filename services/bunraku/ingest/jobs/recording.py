@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from threading import Lock
 
 import numpy as np
 
-from bunraku.codec.container import PerformerTracks, StoredMotion, pack_motion
-from bunraku.codec.motion_encoder import EncodedMotion, EncodingGrade, encode_motion
+from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
-from bunraku.ingest.jobs.motion import FIRST_BLOCK_S, MAX_BEST_GRADE_FRAMES
+from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_motions
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
@@ -61,43 +57,20 @@ def encode_recording(
         )
     except ValueError as error:
         return JobRejection("Invalid camera", str(error), field="camera")
-    encoded, *others = _encode_performers(played.performers, recorded, on_progress)
-    first = recorded[0]
+    # the front of the played motion: control of a hand does not turn the performer
+    encoded, *others = [
+        replace(each, front=performer.front, placement=performer.placement)
+        for performer, each in zip(played.performers, encode_motions(recorded, on_progress), strict=True)
+    ]
     return JobResult(
         pack_motion(motion_id, encoded, scenes, others),
         {
-            "duration": first.duration,
-            "fps": first.fps,
-            "frames": first.frame_count,
-            "blocks": encoded.track.block_count,
+            **describe_encoding(recorded[0], encoded),
             "tracks": [*(["motion"] * len(recorded)), *(scene.track.kind for scene in scenes)],
             **({"performers": len(recorded)} if others else {}),
-            "rates": encoded.describe()["rates"],
             "kept_from": played.id,
         },
     )
-
-
-def _encode_performers(
-    performers: Sequence[PerformerTracks], motions: Sequence[Motion], on_progress: Callable[[float], None]
-) -> list[EncodedMotion]:
-    frame_count = sum(motion.frame_count for motion in motions)
-    grade: EncodingGrade = "best" if frame_count <= MAX_BEST_GRADE_FRAMES else "live"
-    progress_lock = Lock()
-    encoded: list[EncodedMotion] = []
-
-    def report_progress(share: float) -> None:
-        with progress_lock:
-            on_progress((len(encoded) + share) / len(motions))
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for performer, motion in zip(performers, motions, strict=True):
-            each = encode_motion(
-                motion, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=report_progress, map_levels=pool.map
-            )
-            # the front of the played motion: control of a hand does not turn the performer
-            encoded.append(replace(each, front=performer.front, placement=performer.placement))
-    return encoded
 
 
 def sample_camera(keys: Array, times: Sequence[int]) -> SceneSamples:

@@ -10,7 +10,7 @@ from bunraku.codec.container import StoredMotion, replace_scene_tracks
 from bunraku.codec.scene import SceneKind, SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.http.large_body import BodySource, read_body
-from bunraku.ingest.jobs.motion import FIRST_BLOCK_S
+from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S
 from bunraku.ingest.keyframe import CameraKeyframe, LightKeyframe, Staging, parse_staging
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion.easing import minimum_jerk

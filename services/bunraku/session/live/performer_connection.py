@@ -14,7 +14,7 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.token_bucket import TokenBucket
 from bunraku.session.live.sample_json import MAX_SAMPLE_BYTES, parse_sample
 from bunraku.session.stage_endpoint import PUPPETEER_HEARTBEAT_S
-from bunraku.storage.performance_store import PerformanceHeader, PerformanceStore
+from bunraku.storage.performance_store import MAX_DURATION_US, PerformanceHeader, PerformanceStore
 from bunraku.websocket.connection import CLOSED_CONNECTION, FrameLimit, WebSocketConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.heartbeat import Heartbeat
@@ -62,19 +62,16 @@ class PerformerConnection:
         self._clock = clock
         self._connection: WebSocketConnection = CLOSED_CONNECTION
         self._sample_rate = TokenBucket(MAX_SAMPLES_PER_S, SAMPLE_BURST)
-        self._sequence = 0
         self._unstored = bytearray()
         self._part_count = 0
         self._heartbeat = Heartbeat()
         self._heartbeat_timer: asyncio.TimerHandle | None = None
         self._has_closed = asyncio.Event()
-        self._storing: asyncio.Task[None] | None = None
 
     def open(self, connection: WebSocketConnection) -> None:
-        """Send heartbeats to the stage and store the samples from now on."""
+        """Send heartbeats to the stage from now on. Run `store_samples` meanwhile."""
         self._connection = connection
         self._send_heartbeat()
-        self._storing = asyncio.create_task(self._store_samples(), name=f"samples of {self._header.id}")
 
     def receive_told(self, connection: bytes) -> None:
         """Handle which connection is the performer's: none if the performance has ended."""
@@ -114,7 +111,8 @@ class PerformerConnection:
             return
         packed = sample.pack()
         self._stage.send_sample(self._header.id, self.id, packed)
-        if -MAX_AGE_US <= sample.sampled - now <= MAX_AHEAD_US:
+        is_recent = -MAX_AGE_US <= sample.sampled - now <= MAX_AHEAD_US
+        if is_recent and sample.sampled - self._header.created_us <= MAX_DURATION_US:
             self._unstored += packed
 
     def on_pong(self, payload: bytes) -> bool:  # noqa: ARG002
@@ -133,7 +131,7 @@ class PerformerConnection:
             self._heartbeat_timer.cancel()
         self._has_closed.set()
 
-    async def _store_samples(self) -> None:
+    async def store_samples(self) -> None:
         """Store the samples of each second until the connection has closed, then tell the stage."""
         header_at_us = self._clock()
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from contextlib import ExitStack
 from http import HTTPStatus
 from typing import Any
@@ -27,6 +28,12 @@ from bunraku.websocket.handoff import detach, reject
 from bunraku.websocket.subprotocol import CloseConnection
 
 DEFAULT_NAME = "A performer"
+CLOSE_TIMEOUT_S = 5.0
+"""Time in which a replica that stops stores the last samples."""
+_CLOSE_CODES: dict[int, int] = {
+    HTTPStatus.NOT_FOUND: subprotocol.NOT_FOUND,
+    HTTPStatus.FORBIDDEN: subprotocol.FORBIDDEN,
+}
 
 
 class Performers:
@@ -36,20 +43,29 @@ class Performers:
         self._context = context
         self._sessions = sessions
         self._store = context.motion_store.performances
+        self._connections: dict[PerformerConnection, asyncio.Task[None]] = {}
+
+    async def close(self) -> None:
+        """Wait until the last samples of all connections are stored, as this replica stops."""
+        for connection in tuple(self._connections):
+            connection.on_close()
+        if self._connections:
+            await asyncio.wait(self._connections.values(), timeout=CLOSE_TIMEOUT_S)
 
     async def create(self, new: NewPerformer, access: Access, subject: str | None) -> dict[str, Any]:
         """Bring a performer on the stage of a session, or of a new one, and return it as the API shows it.
 
         `subject` is that whose number of sessions is limited, None without a limit.
         """
-        figure = standard_figure() if new.figure is None else new.figure.to_figure()
+        # the tables of new arms take a tenth of a second each
+        figure = standard_figure() if new.figure is None else await asyncio.to_thread(new.figure.to_figure)
         if new.session is not None:
             # before anything is stored
             await self._sessions.stage_proxy(new.session).describe()
         session = new.session or create_session_id()
         name = clean_text(new.name) or DEFAULT_NAME
         member = CastMember(create_performer_id(session), name, new.fps, new.placement(), access.subject)
-        header = PerformanceHeader(member.id, name, new.fps, figure, access.subject)
+        header = PerformanceHeader(member.id, name, new.fps, figure, self._context.clock(), access.subject)
         await self._store.put_header(header)
         try:
             await self._sessions.casts.put_figure(member, figure)
@@ -77,29 +93,28 @@ class Performers:
     async def serve_input(self, socket: WebSocket, performer: str) -> None:
         """Connect a performer to its stage until one of them ends or the access expires."""
         try:
-            header = await self._require_connectable(performer, access_of(socket))
+            header = await self._require(performer, access_of(socket))
             stage, context = self._proxy(performer), self._context
             connection = PerformerConnection(stage, header, self._store, context.clock)
             with ExitStack() as stack:
                 subject = stage.performer_subject(performer)
                 stack.callback(context.bus.subscribe(subject, connection.receive_told).unsubscribe)
-                await _attach(stage, performer, connection)
+                await stage.attach_performer(performer, connection.id)
                 await subprotocol.accept(socket)
                 accepted = detach(socket, connection, context.clock, PERFORMER_FRAMES)
                 stack.callback(context.authenticator.register_connection(access_of(socket), connection.close))
                 accepted.on_ended = stack.pop_all().close
             connection.open(accepted)
+            self._connections[connection] = task = asyncio.create_task(
+                connection.store_samples(), name=f"samples of {performer}"
+            )
+            task.add_done_callback(lambda _: self._connections.pop(connection, None))
         except CloseConnection as reason:
             await reject(socket, reason)
-
-    async def _require_connectable(self, performer: str, access: Access) -> PerformanceHeader:
-        try:
-            return await self._require(performer, access)
         except ProblemError as error:
-            code = subprotocol.NOT_FOUND if error.status == HTTPStatus.NOT_FOUND else subprotocol.FORBIDDEN
-            raise CloseConnection(code, error.title, error.detail) from None
+            await reject(socket, _close_reason(error))
         except BackendUnavailable as error:
-            raise CloseConnection.unavailable(error) from None
+            await reject(socket, CloseConnection.unavailable(error))
 
     async def _require(self, performer: str, access: Access) -> PerformanceHeader:
         """Return the header of a performer whom the client may use: its own, or any for an admin."""
@@ -115,14 +130,10 @@ class Performers:
         return self._sessions.stage_proxy(session_of(performer))
 
 
-async def _attach(stage: StageProxy, performer: str, connection: PerformerConnection) -> None:
-    try:
-        await stage.attach_performer(performer, connection.id)
-    except ProblemError as error:
-        code = subprotocol.NOT_FOUND if error.status == HTTPStatus.NOT_FOUND else subprotocol.TRY_AGAIN_LATER
-        raise CloseConnection(code, error.title, error.detail) from None
-    except BackendUnavailable as error:
-        raise CloseConnection.unavailable(error) from None
+def _close_reason(error: ProblemError) -> CloseConnection:
+    """Return the reason to close a connection for a problem."""
+    code = _CLOSE_CODES.get(error.status, subprotocol.TRY_AGAIN_LATER)
+    return CloseConnection(code, error.title, error.detail)
 
 
 def _performer_json(performer: dict[str, Any], header: PerformanceHeader) -> dict[str, Any]:
