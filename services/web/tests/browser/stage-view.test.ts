@@ -28,10 +28,13 @@ function countDrawnPixels(page: Page): Promise<AlphaCounts> {
       new Promise<AlphaCounts>((resolve) => {
         const { stage } = globalThis.bunraku;
         const gl = stage.renderer.getContext();
-        const { frame } = stage.renderer.info.render;
+        let { frame } = stage.renderer.info.render;
         const read = () => {
-          // Each frame of the stage is requested before this one, so that it is drawn before it.
-          if (stage.renderer.info.render.frame === frame) return void requestAnimationFrame(read);
+          // Each frame of the stage is requested before this one, so that it is drawn before it. Textures are rendered
+          // too; only a frame on the canvas leaves it up to date.
+          const hasRendered = stage.renderer.info.render.frame !== frame;
+          ({ frame } = stage.renderer.info.render);
+          if (!hasRendered || !stage.isUpToDate || gl.isContextLost()) return void requestAnimationFrame(read);
           const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
           const pixels = new Uint8Array(width * height * 4);
           gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
@@ -67,12 +70,13 @@ describeInBrowser("stage view", { server: "open" }, (fixture) => {
     await other.keyboard.press("Digit2");
     await waitInEngine(page, (limb) => globalThis.bunraku.stage.strings.barPosition(limb) !== null, LEFT_HAND);
     const drawn = await countDrawnPixels(page);
-    expect(drawn.transparent).toBeGreaterThan(0.4);
-    expect(drawn.opaque).toBeGreaterThan(0.03);
-    expect(drawn.partial).toBeGreaterThan(0.001);
+    const counts = JSON.stringify(drawn);
+    expect(drawn.transparent, counts).toBeGreaterThan(0.4);
+    expect(drawn.opaque, counts).toBeGreaterThan(0.03);
+    expect(drawn.partial, counts).toBeGreaterThan(0.001);
     // Rounding of the blended colours and of alpha.
-    expect(drawn.excess).toBeLessThanOrEqual(2);
-    expect(drawn.hidden).toBeLessThanOrEqual(1);
+    expect(drawn.excess, counts).toBeLessThanOrEqual(2);
+    expect(drawn.hidden, counts).toBeLessThanOrEqual(1);
     // The page around the canvas is transparent too.
     const alphas = cornerAlphas(await page.screenshot({ omitBackground: true }));
     expect(alphas).toEqual([0, 0, 0, 0]);
