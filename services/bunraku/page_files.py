@@ -41,7 +41,7 @@ CROSS_ORIGIN_PREFIX = "embed/"
 PIECE_BYTES = 16 << 10
 """Bytes of a file that are sent at once."""
 ENCODINGS = {"br": ".br", "gzip": ".gz"}
-"""Content encodings, the best one first, and the suffixes of the copies that `services/web/compress-page.mjs` makes."""
+"""Content encodings, the best one first, and the suffixes of the copies that `services/web/compress_page.py` makes."""
 
 
 class PageFile(Response):
