@@ -19,7 +19,7 @@ from pathlib import Path
 
 from bunraku.client.api import Client
 from tests.servers import make_bvh_clip
-from tests.verify import process_fault, upload_fault
+from tests.verify import live_fault, process_fault, upload_fault
 from tests.verify.result import FaultResult
 from tests.verify.scenario import PROBE_SOURCE, open_scenario
 from tests.verify.stack import REPOSITORY, Stack
@@ -36,7 +36,7 @@ def main() -> None:
     )
     parser.add_argument("--port", type=int, default=8080)
     parser.add_argument(
-        "--only", default="", help="run only faults whose names contain one of these words: kill,stop,gone,nats"
+        "--only", default="", help="run only faults whose names contain one of these words: kill,live,stop,gone,nats"
     )
     parser.add_argument("--keep", action="store_true", help="leave the stack running")
     options = parser.parse_args()
@@ -85,6 +85,11 @@ async def _run_faults(
                 (f"kill {name}", process_fault.kill_service(scenario, name, folder, options.rounds))
                 for name in process_fault.KILL_TARGETS
             ),
+            *(
+                (f"live {name}", live_fault.kill_during_performance(scenario, name, options.rounds))
+                for name in live_fault.TARGETS
+            ),
+            ("live capture", live_fault.kill_capture(scenario, _select_clip(folder), options.rounds)),
             ("full", upload_fault.fill_disk(scenario, options.rounds)),
             ("cut", upload_fault.interrupt_upload(scenario, options.rounds)),
             ("encoding", upload_fault.kill_while_encoding(scenario, options.rounds)),

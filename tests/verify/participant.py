@@ -16,6 +16,7 @@ from bunraku.client.reconnecting_connection import ReconnectingConnection
 from bunraku.client.viewer import Viewer
 from bunraku.playout.timeline import position_at
 from bunraku.runtime.clock import clock
+from bunraku.wire.live import Live
 from bunraku.wire.overlay import Overlay
 
 FRAME_S = 1 / 20
@@ -42,6 +43,7 @@ class MonitoredViewer(Viewer):
         super().__init__(url)
         self.message_times: list[float] = []
         self.overlay_times: list[float] = []
+        self.live_times: list[float] = []
         self.dues: list[int] = []
         self.closes: list[tuple[float, int | None]] = []
         self._connection = recorder = _CloseRecorder(self._make_url, self._on_open, self._on_bytes)
@@ -88,11 +90,17 @@ class MonitoredViewer(Viewer):
         """Return the longest time since `since` without an overlay of a controlled limb, seconds."""
         return _longest_gap(self.overlay_times, since)
 
+    def longest_live_gap_s(self, since: float) -> float:
+        """Return the longest time since `since` without a pose of a live performer, seconds."""
+        return _longest_gap(self.live_times, since)
+
     def _on_message(self, data: bytes) -> None:
         now = time.monotonic()
         self.message_times.append(now)
         if data[0] == Overlay.TYPE and data[1]:
             self.overlay_times.append(now)
+        elif data[0] == Live.TYPE:
+            self.live_times.append(now)
         super()._on_message(data)
 
 
