@@ -59,7 +59,12 @@ class WatchedSession:
     """One session, as the viewers of this replica see it."""
 
     def __init__(
-        self, session: str, source: SessionSource, context: StreamContext, state: bytes, on_empty: Callable[[], None]
+        self,
+        session: str,
+        source: SessionSource,
+        context: StreamContext,
+        state: bytes,
+        on_empty: Callable[[WatchedSession], None],
     ) -> None:
         """Subscribe to the session.
 
@@ -144,7 +149,7 @@ class WatchedSession:
         self._writable = None
         self._publish_count_throttled(len(self._viewers))
         if not self._viewers:
-            self._on_empty()
+            self._on_empty(self)
 
     def invalidate_writable(self) -> None:
         """Recompute, before the next overlay, which viewers can be written to directly."""
@@ -172,11 +177,12 @@ class WatchedSession:
             self._motion_task.cancel()
             # a task that has not started yet does not do it
             self._motion_task = None
-        if self._count_timer is not None:
-            self._count_timer.cancel()
         self._publish_count(0)
-        if self._refresh_timer is not None:
-            self._refresh_timer.cancel()
+        # a timer refers to the session: without it, the session and its blocks are freed at once
+        for timer in (self._count_timer, self._refresh_timer):
+            if timer is not None:
+                timer.cancel()
+        self._count_timer = self._refresh_timer = None
 
     def _publish_count_throttled(self, viewers: int) -> None:
         """Publish the number of viewers, now or at the end of the interval."""
@@ -317,9 +323,7 @@ class WatchedSessions:
             if session not in self._sessions:
                 # the session outlives the request of its first viewer, and must not log that request's id
                 with request_id.bind(""):
-                    opened = WatchedSession(
-                        session, self._source, self._context, state, lambda: self._close_if_unused(opened)
-                    )
+                    opened = WatchedSession(session, self._source, self._context, state, self._close_if_unused)
                     self._sessions[session] = opened
                     # the state may have changed before the subscription
                     self._resynchronise(opened)
