@@ -24,6 +24,7 @@ import {
   waitFor,
   waitForAnnouncement,
   waitForButton,
+  waitForHand,
   waitForStart,
 } from "./page";
 import type { WebDriverFixture } from "./webdriver-suite";
@@ -56,6 +57,7 @@ export function definePageCases(fixture: WebDriverFixture): void {
 
   /** Drag a hand upwards and release it: it moves, and does not stay there. */
   async function pullHand(window: BrowserWindow, pointerType: PointerType, hand: Point): Promise<void> {
+    await waitForHand(window, hand);
     const before = await window.screenshot();
     await point(window, pointerType, ["move", hand], ["down"]);
     await waitForHeldLimbs(1);

@@ -150,13 +150,18 @@ export async function findHand(window: BrowserWindow): Promise<Point> {
     },
     INVITATION_DISTANCE_PX,
   );
+  await waitForHand(window, hand);
+  return hand;
+}
+
+/** Move the mouse to a place and wait until a hand can be taken there: one that was released takes time to return. */
+export async function waitForHand(window: BrowserWindow, hand: Point): Promise<void> {
   await point(window, "mouse", ["move", hand]);
   await waitFor(
     window,
     "that the pointer can take the hand",
     () => getComputedStyle(document.querySelector("#stage") as Element).cursor === "grab",
   );
-  return hand;
 }
 
 /** Wait until the page or an element has announced a text that contains `part`, and return how often it has. */
