@@ -79,7 +79,9 @@ async def test_each_encoding_is_revalidated_by_its_own_tag(page: Path) -> None:
 
 async def test_head_has_the_headers_of_get_without_the_content(page: Path) -> None:
     async with open_client(page) as client:
-        head, get = [await client.request(method, "/assets/index-abc.js") for method in ("HEAD", "GET")]
+        # httpx2 would decode the missing content of a HEAD response with Brotli, where that is installed
+        accepted = {"Accept-Encoding": "gzip"}
+        head, get = [await client.request(name, "/assets/index-abc.js", headers=accepted) for name in ("HEAD", "GET")]
     assert head.content == b""
     assert head.headers == get.headers
 

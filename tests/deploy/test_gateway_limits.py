@@ -97,14 +97,14 @@ async def run_recording_service(
             await asyncio.gather(*service.connections)
 
 
-async def send_and_read(port: int, data: bytes) -> bytes:
-    """Send bytes and return everything until the gateway closes the connection."""
+async def send_and_read(port: int, data: bytes, end: bytes | None = None) -> bytes:
+    """Send bytes and return everything until `end`, by default until the gateway closes the connection."""
     reader, writer = await asyncio.open_connection("127.0.0.1", port)
     try:
         writer.write(data)
         async with asyncio.timeout(HANG_TIMEOUT_S):
             with suppress(ConnectionError):
-                return await reader.read()
+                return await (reader.read() if end is None else reader.readuntil(end))
             return b""
     finally:
         writer.close()
@@ -145,10 +145,13 @@ async def test_rejection_does_not_wait_for_the_body(
 ) -> None:
     async with run_recording_service(b"no", status) as (_, service_port):
         with run_gateway(tmp_path, service_port, monkeypatch) as port:
-            for response in await asyncio.gather(*(send_and_read(port, data) for data in BODIES_THAT_DO_NOT_ARRIVE)):
+            # the connection ends with the response, but in one of 350 cases Caddy waits for the body before it closes it
+            end = b"\r\n\r\nno"
+            reading = (send_and_read(port, data, end) for data in BODIES_THAT_DO_NOT_ARRIVE)
+            for response in await asyncio.gather(*reading):
                 assert response.startswith(b"HTTP/1.1 " + status)
                 assert b"\r\nRetry-After: 7\r\n" in response
-                assert response.endswith(b"\r\n\r\nno")
+                assert response.endswith(end)
 
 
 async def test_large_headers_are_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
