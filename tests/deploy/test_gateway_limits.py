@@ -145,7 +145,7 @@ async def test_rejection_does_not_wait_for_the_body(
 ) -> None:
     async with run_recording_service(b"no", status) as (_, service_port):
         with run_gateway(tmp_path, service_port, monkeypatch) as port:
-            # the connection ends with the response, but in one of 350 cases Caddy waits for the body before it closes it
+            # the connection ends with the response, but in one of 350 cases Caddy waits for the body before that
             end = b"\r\n\r\nno"
             reading = (send_and_read(port, data, end) for data in BODIES_THAT_DO_NOT_ARRIVE)
             for response in await asyncio.gather(*reading):
