@@ -8,22 +8,29 @@ from __future__ import annotations
 import asyncio
 import functools
 import gc
+import socket as sockets
+import struct
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import pytest
+from uvicorn.protocols.http.h11_impl import RequestResponseCycle
 from websockets import Origin
 from websockets.asyncio.client import connect
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.server import ServerProtocol
 
 from bunraku.client import Client, Puppeteer
+from bunraku.http.protocol import HttpProtocol
+from bunraku.session.live.performer_connection import PerformerConnection
 from bunraku.session.puppeteer_connection import PuppeteerConnection
 from bunraku.session.stage import Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.stream.viewer_connection import ViewerConnection
+from bunraku.stream.watched_session import WatchedSession
 from bunraku.websocket.connection import WebSocketConnection
 from bunraku.websocket.handoff import HandoffProtocol
 from tests.servers import run_server
@@ -32,11 +39,15 @@ from tests.time_limit import HANG_TIMEOUT_S
 
 OWNED_BY_CLIENTS = (
     HandoffProtocol,
+    HttpProtocol,
+    PerformerConnection,
     PuppeteerConnection,
+    RequestResponseCycle,
     ServerProtocol,
     Stage,
     StageEndpoint,
     ViewerConnection,
+    WatchedSession,
     WebSocketConnection,
 )
 
@@ -90,9 +101,27 @@ async def test_clients_that_left_leave_no_object_behind(tmp_path: Path, clip_fil
                 await connect(
                     f"{url.replace('http', 'ws')}/v1/motions/{motion}/stream", origin=Origin("https://other.example")
                 )
+            async with client.perform(session=session) as performer:
+                assert living[PerformerConnection] == 1
+                await performer.describe()
+            await begin_upload(url)
             assert living[Stage] == living[StageEndpoint] == 1
             await client._request("DELETE", f"/v1/sessions/{session}")
-            await wait_until_freed(living)
+        await wait_until_freed(living)
+
+
+async def begin_upload(url: str) -> None:
+    """Begin an upload and reset its connection once the server reads the body."""
+    parts = urlsplit(url)
+    reader, writer = await asyncio.open_connection(parts.hostname, parts.port)
+    fields = "Host: a\r\nContent-Length: 1000000\r\nExpect: 100-continue"
+    writer.write(f"POST /v1/motions?filename=a.bvh HTTP/1.1\r\n{fields}\r\n\r\n".encode())
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        await reader.readuntil(b"100")
+    writer.write(b"x" * 100_000)
+    await writer.drain()
+    writer.get_extra_info("socket").setsockopt(sockets.SOL_SOCKET, sockets.SO_LINGER, struct.pack("ii", 1, 0))
+    writer.transport.abort()
 
 
 async def wait_until_freed(living: Counter[type]) -> None:

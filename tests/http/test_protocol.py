@@ -2,11 +2,8 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import gc
 import socket
-import struct
 import sys
-import weakref
 from collections.abc import Awaitable, Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -343,38 +340,6 @@ async def test_receive_buffer_is_small_until_the_application_reads_a_body(
         writer.close()
         await writer.wait_closed()
     assert (buffer_bytes > protocol.RECEIVE_BUFFER_BYTES) == is_enlarged
-
-
-async def test_lost_connection_is_freed_without_a_garbage_collection() -> None:
-    async def app(_: object, receive: Callable[[], Awaitable[dict[str, object]]], __: object) -> None:
-        while (await receive())["type"] != "http.disconnect":
-            continue
-
-    config = uvicorn.Config(app, lifespan="off", log_config=None)
-    config.load()
-    load, alive = HttpLoad(), weakref.WeakSet[HttpProtocol]()
-
-    def accept() -> HttpProtocol:
-        alive.add(connection := HttpProtocol(load, config, ServerState(), {}))
-        return connection
-
-    gc.collect()
-    gc.disable()
-    try:
-        server = await asyncio.get_running_loop().create_server(accept, "127.0.0.1", 0)
-        async with server, asyncio.timeout(HANG_TIMEOUT_S):
-            for _ in range(5):
-                reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
-                writer.write(HEAD + b"x" * 100_000)
-                while not alive:  # noqa: ASYNC110
-                    await asyncio.sleep(0)
-                writer.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
-                writer.transport.abort()
-                await read_until_closed(reader)
-            while alive:  # noqa: ASYNC110
-                await asyncio.sleep(0.01)
-    finally:
-        gc.enable()
 
 
 async def test_oldest_waiting_connection_makes_room_for_a_new_one(url: str, monkeypatch: pytest.MonkeyPatch) -> None:

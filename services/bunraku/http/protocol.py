@@ -213,10 +213,8 @@ class HttpProtocol(H11Protocol):
         self._write_deadline.stop()
         self._unparsed.clear()
         super().connection_lost(exc)
-        if self.cycle is not None:
-            # protocol and cycle refer to each other: a collection, which is rare, would come too late for the body
-            self.cycle.body = bytearray()
-            self.cycle = None  # type: ignore[assignment]
+        # they refer to each other: without this, the body would stay until a garbage collection, which is rare
+        self.cycle = None  # type: ignore[assignment]
 
     def handle_input(self) -> bool:
         """Parse received data for about `PARSE_TIME_S`. Return whether some of it is left."""

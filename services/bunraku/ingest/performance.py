@@ -11,7 +11,7 @@ from functools import partial
 
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.persistence import check_quota, store_motion
-from bunraku.ingest.result import TOO_SHORT, JobRejection, require_result
+from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.lease import hold_lease
 from bunraku.messaging.performance_request import PERFORMANCE_KEY_PREFIX, PERFORMANCE_SUBJECT, performed_subject
@@ -142,8 +142,10 @@ class PerformanceOperation:
             )
         if isinstance(outcome, JobRejection):
             _log.warning("performance %s has no motion: %s: %s", header.id, outcome.title, outcome.detail)
+            if outcome.title == NOTHING_TO_KEEP:
+                return True
             self._failed.add(header.id)
-            return outcome.title == TOO_SHORT
+            return False
         result = require_result(outcome)
         description = {
             "name": clean_text(header.name),

@@ -16,7 +16,7 @@ from bunraku.http.problem_details import validation_problem
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.persistence import check_quota, store_motion
-from bunraku.ingest.result import JobResult, require_result
+from bunraku.ingest.result import NOTHING_TO_KEEP, JobResult, require_result
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.lease import hold_lease
 from bunraku.messaging.recording_request import (
@@ -137,7 +137,7 @@ def parse_recording_request(message: bytes) -> RecordingRequest:
     except (ValueError, msgpack.UnpackException) as error:
         raise ProblemError(422, "Invalid request", f"not a recording request: {error}") from None
     if request.frame_count < 1:
-        raise ProblemError(422, "Nothing to keep", "the interval is shorter than one frame", field="seconds")
+        raise ProblemError(422, NOTHING_TO_KEEP, "the interval is shorter than one frame", field="seconds")
     if request.frame_count > MAX_RECORDING_S * RECORDING_FPS:
         detail = f"a recording has at most {MAX_RECORDING_S} seconds"
         raise ProblemError(422, "Too long", detail, field="seconds", hint="record a shorter part")

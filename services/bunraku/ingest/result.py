@@ -8,8 +8,8 @@ from typing import Any
 from bunraku.runtime.display_text import clean_document
 from bunraku.runtime.problem import ProblemError
 
-TOO_SHORT = "Nothing to keep"
-"""Title of the rejection of a recording or performance without two frames."""
+NOTHING_TO_KEEP = "Nothing to keep"
+"""Title of the rejection of a recording or performance that has no motion."""
 MAX_TEXT_CHARACTERS = 500
 """Maximum length of a text in a motion's description."""
 

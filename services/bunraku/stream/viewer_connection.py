@@ -184,7 +184,6 @@ class ViewerConnection(BinaryListener):
         self._stop()
         if self.group is not None:
             self.group.remove_viewer(self)
-            self.group = None
 
     def tick(self) -> None:
         """Check the heartbeat, send due data, and schedule the next tick."""

@@ -177,12 +177,11 @@ class WatchedSession:
             self._motion_task.cancel()
             # a task that has not started yet does not do it
             self._motion_task = None
+        if self._count_timer is not None:
+            self._count_timer.cancel()
         self._publish_count(0)
-        # a timer refers to the session: without it, the session and its blocks are freed at once
-        for timer in (self._count_timer, self._refresh_timer):
-            if timer is not None:
-                timer.cancel()
-        self._count_timer = self._refresh_timer = None
+        if self._refresh_timer is not None:
+            self._refresh_timer.cancel()
 
     def _publish_count_throttled(self, viewers: int) -> None:
         """Publish the number of viewers, now or at the end of the interval."""

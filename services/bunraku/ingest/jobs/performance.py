@@ -8,7 +8,7 @@ import numpy as np
 
 from bunraku.codec.container import pack_motion
 from bunraku.ingest.jobs.encoding import describe_encoding, encode_motions
-from bunraku.ingest.result import TOO_SHORT, JobRejection, JobResult
+from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.motion.skeleton import Figure, Motion
 from bunraku.playout.block_store import Pose
 from bunraku.playout.performance import MAX_GAP_US, Performance, sample_pose
@@ -27,7 +27,7 @@ def encode_performance(
     """Encode a performance from its first to its last sample; `on_progress` receives the encoded share, 0..1."""
     samples = read_samples(parts)
     if len(samples) < MIN_SAMPLES:
-        return JobRejection(TOO_SHORT, f"the performance has {len(samples)} samples")
+        return JobRejection(NOTHING_TO_KEEP, f"the performance has {len(samples)} samples")
     motion = sample_evenly(header.figure, header.fps, samples)
     (encoded,) = encode_motions([motion], on_progress)
     return JobResult(pack_motion(motion_id, encoded), describe_encoding(motion, encoded))

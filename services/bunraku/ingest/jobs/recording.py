@@ -12,7 +12,7 @@ from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_motions
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
-from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion
@@ -36,7 +36,7 @@ def encode_recording(
     states = [session.timeline_at(time) for time in times]
     last_state = states[-1]
     if last_state is None:
-        return JobRejection("Nothing to keep", "the session played no motion in this interval", field="seconds")
+        return JobRejection(NOTHING_TO_KEEP, "the session played no motion in this interval", field="seconds")
     is_other_motion = [state is None or state.motion != last_state.motion for state in states]
     times = times[1 + max((frame for frame, is_other in enumerate(is_other_motion) if is_other), default=-1) :]
     try:
