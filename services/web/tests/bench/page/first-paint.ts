@@ -1,5 +1,4 @@
 /** Cases `arrival` and `line`: time to the first paint of the puppet, and size of the scripts and fonts. */
-import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
 import { evaluateInEngine } from "../../browser/engine-probe";
 import { LEFT_HAND, tapKey, waitForFirstPose, waitForHold, waitForWelcome } from "../../browser/page-probe";
@@ -93,7 +92,10 @@ function watchFirstPaint(): void {
   poll();
 }
 
-/** Return the transfer sizes of the scripts (gzip) and fonts that a page loads until a hand is held. */
+/**
+ * Return the bytes of the scripts and fonts that a page loads until a hand is held, as the server sends them to a
+ * browser that accepts gzip.
+ */
 async function measureDownloads(bench: BenchContext): Promise<BenchFigures> {
   const urls = await withPage(bench, {}, async ({ page }) => {
     await page.goto(bench.url);
@@ -113,8 +115,9 @@ async function measureDownloads(bench: BenchContext): Promise<BenchFigures> {
   for (const url of new Set(urls)) {
     const [, kind] = /\.(js|woff2)$/.exec(new URL(url).pathname) ?? [];
     if (kind !== "js" && kind !== "woff2") continue;
-    const body = Buffer.from(await (await fetch(url)).arrayBuffer());
-    const size = (kind === "js" ? gzipSync(body, { level: 9 }) : body).length;
+    const response = await fetch(url, { method: "HEAD", headers: { "Accept-Encoding": "gzip" } });
+    const size = Number(response.headers.get("content-length"));
+    if (!response.ok || !(size > 0)) throw new Error(`The server does not tell the size of ${url}`);
     sizes[kind] += size;
     bench.note(`loaded: ${new URL(url).pathname.slice(8)} ${roundTo(size / 1000)} kB`);
   }
