@@ -7,6 +7,7 @@ import { listenToKeyboard } from "../input/keyboard";
 import type { Mapping } from "../input/mapping";
 import { loadMapping } from "../input/mapping-store";
 import { listenToMouse } from "../input/mouse";
+import type { PointerInput } from "../input/pointer";
 import { listenToPointer, showPointerState } from "../input/pointer-events";
 import type { Theme } from "../stage/scenery/look";
 import type { ElementView } from "./view";
@@ -94,11 +95,9 @@ export class ElementRenderer {
     stage.reducedMotion = this.#still;
     stage.setTheme(this.#theme);
     const getMapping = () => (this.#controls ? this.mapping : { ...this.mapping, bindings: {} });
-    const showPointer = () =>
-      showPointerState(canvas, { isPointerNear: pointer.hoveredLimb !== null, isPulling: pointer.isDragging });
     listenToPointer(canvas, (message) => {
       pointer.handle(message);
-      showPointer();
+      this.#showPointer(pointer);
     });
     listenToKeyboard(frame, commands, velocity, getMapping, { showKeys: ignore, onEscape: ignore });
     listenToMouse(canvas, frame, commands, getMapping);
@@ -148,6 +147,10 @@ export class ElementRenderer {
     this.stageController?.stage.resize(width, height, framing, devicePixelRatio);
   }
 
+  #showPointer({ hoveredLimb, isDragging }: PointerInput): void {
+    showPointerState(this.view.canvas, { isPointerNear: hoveredLimb !== null, isPulling: isDragging });
+  }
+
   #draw(): void {
     this.#animationFrame = requestAnimationFrame(() => this.#draw());
     const { stageController } = this;
@@ -155,6 +158,7 @@ export class ElementRenderer {
     const now = performance.now();
     const { pose, limbs } = stageController.draw(now, this.focusedLimb);
     const { stage } = stageController;
+    this.#showPointer(stageController.pointer);
     const bars = pose ? limbs.map((_, limb) => stage.barBox(limb)) : [];
     const anchors = { limbs, bars, faces: stage.faceBoxes, hand: null };
     this.view.placeNameTags(anchors, stageController.selectedPerformer, now);

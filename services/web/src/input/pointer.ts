@@ -32,7 +32,7 @@ export interface PointerMessage {
 
 export interface PointerInput {
   handle(message: PointerMessage): void;
-  /** Limb under the pointer, highlighted; null for none. */
+  /** Limb under the pointer, highlighted; null for none. Limbs move under a resting pointer. */
   readonly hoveredLimb: number | null;
   /** True if a limb is being dragged. */
   readonly isDragging: boolean;
@@ -82,7 +82,8 @@ export function createPointerInput(
   { canClaim, onRefused, onClaimed, smoothing, depthInput }: PointerOptions,
 ): PointerInput {
   const drags = new Map<number, Drag>();
-  let hoveredLimb: number | null = null;
+  /** Where a pointer is that is seen without being pressed; null for none. */
+  let hovering: { id: number; x: number; y: number } | null = null;
   let orbiting: { id: number; x: number; y: number } | null = null;
   const handle = new Vector3();
   const handleAt = (limb: number) => stage.performers[performerOfLimb(limb)].handle(limbWithinPerformer(limb), handle);
@@ -154,14 +155,13 @@ export function createPointerInput(
   };
   const move = ({ pointerId, pointerType, x, y, now }: PointerMessage) => {
     const drag = drags.get(pointerId);
+    if (pointerType !== "touch") hovering = { id: pointerId, x, y };
     if (drag) {
       Object.assign(drag, { x, y });
       pull(drag, now);
     } else if (orbiting?.id === pointerId) {
       stage.audience.orbit((orbiting.x - x) * ORBIT_RAD_PER_PX, (y - orbiting.y) * ORBIT_RAD_PER_PX);
       orbiting = { id: pointerId, x, y };
-    } else if (pointerType !== "touch") {
-      hoveredLimb = limbNear(x, y);
     }
   };
   const release = ({ pointerId }: PointerMessage) => {
@@ -175,10 +175,11 @@ export function createPointerInput(
       if (message.kind === "down") press(message);
       else if (message.kind === "move") move(message);
       else if (message.kind === "up") release(message);
-      else hoveredLimb = null;
+      else hovering = null;
     },
     get hoveredLimb() {
-      return hoveredLimb;
+      if (!hovering || orbiting) return null;
+      return drags.get(hovering.id)?.limb ?? limbNear(hovering.x, hovering.y);
     },
     get isDragging() {
       return drags.size > 0;

@@ -154,6 +154,29 @@ test("the handle under the pointer in the drawn picture is grabbed, although it 
   expect(pullTarget().distanceTo(moved.add(new Vector3(0.1, 0, 0)))).toBeLessThan(1e-9);
 });
 
+test("a limb that moves under a resting pointer is hovered, and no longer when it has left", () => {
+  const at = { x: ring().x * SCALE, y: -ring().y * SCALE };
+  drawnHandles = [{ x: at.x + 100, y: at.y }];
+  send("pointermove", at.x, at.y, 0);
+  expect(pointer.hoveredLimb).toBe(null);
+  drawnHandles = [at];
+  expect(pointer.hoveredLimb).toBe(LEFT_HAND);
+  // a dragged limb stays hovered, although it may not reach the pointer
+  send("pointerdown", at.x, at.y, 16);
+  send("pointermove", at.x + 300, at.y, 32);
+  expect(pointer.hoveredLimb).toBe(LEFT_HAND);
+  send("pointerup", at.x + 300, at.y, 48);
+  expect(pointer.hoveredLimb).toBe(null);
+  // nothing is hovered while the view turns under the pointer
+  send("pointerdown", at.x + 300, at.y, 64);
+  send("pointermove", at.x, at.y, 80);
+  expect(pointer.hoveredLimb).toBe(null);
+  send("pointerup", at.x, at.y, 96);
+  expect(pointer.hoveredLimb).toBe(LEFT_HAND);
+  send("pointerleave", at.x, at.y, 112);
+  expect(pointer.hoveredLimb).toBe(null);
+});
+
 test("a drag beside all handles of the drawn picture turns the view", () => {
   drawnHandles = [];
   grab();
