@@ -4,6 +4,9 @@ import { MotionList } from "../ui/library/motion-list";
 import type { Page } from "../ui/page";
 import type { RemotePlayback } from "./remote-playback";
 
+/** Interval at which the library is looked at for a motion that is being stored, and the number of times. */
+const [STORED_INTERVAL_MS, STORED_ATTEMPTS] = [1000, 30];
+
 export class LibraryController {
   readonly motions = new MotionList();
 
@@ -25,6 +28,17 @@ export class LibraryController {
   async refresh(): Promise<void> {
     await this.motions.refresh();
     this.render();
+  }
+
+  /** Wait for a motion that the server is storing; null if it does not come. */
+  async waitFor(id: string): Promise<MotionItem | null> {
+    for (let attempt = 0; attempt < STORED_ATTEMPTS; attempt++) {
+      await this.refresh().catch(() => undefined);
+      const motion = this.motions.find(id);
+      if (motion) return motion;
+      await new Promise((resolve) => setTimeout(resolve, STORED_INTERVAL_MS));
+    }
+    return null;
   }
 
   /** Delete a motion from the library. Rejects with ProblemError. */

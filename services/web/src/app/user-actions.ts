@@ -10,7 +10,7 @@ import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem, uploadAll } from "../ui/library/upload";
 import type { Page, UserActions } from "../ui/page";
 import type { ThemeChoice } from "../ui/theme";
-import { createRecordAction } from "../ui/transport/recording";
+import { createRecordAction, type KeptMotionActions, showKept } from "../ui/transport/recording";
 import type { AvatarSlots } from "./avatar-slot";
 import { addMotionToStage } from "./cast";
 import type { Exporter } from "./exporter";
@@ -22,6 +22,7 @@ import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
 import type { SoundController } from "./sound-controller";
 import type { StageHost } from "./stage-host";
+import type { WebcamStage } from "./webcam-controller";
 
 /** Parts of the application that actions use. An action reads them when it runs: the page is built before them. */
 export interface AppParts {
@@ -76,7 +77,7 @@ export function createUserActions(app: AppParts): UserActions {
       else commands.release(`page ${input}`, performance.now());
     },
     useCamera: (onChange) =>
-      import("./webcam-controller").then(({ toggleWebcam }) => toggleWebcam(app.page.toast, app.limbs, onChange)),
+      import("./webcam-controller").then(({ toggleWebcam }) => toggleWebcam(webcamStage(app), onChange)),
     mapping: (mapping) => app.setMapping(mapping),
     focus: (limb) => app.limbs.focus(limb),
     dancer: (performer) => app.limbs.selectPerformer(performer),
@@ -129,6 +130,32 @@ function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly Fi
   void uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
 }
 
+function webcamStage(app: AppParts): WebcamStage {
+  const { playback, limbs, displayName, page, library } = app;
+  const { current } = playback;
+  return {
+    moveBody: (hands, now) => limbs.moveBody(hands, now),
+    session: current?.kind === "sessions" && pageAccess.allows("ingest") ? current.id : null,
+    displayName,
+    toast: page.toast,
+    onPerformed: (id) =>
+      void library.waitFor(id).then((motion) => {
+        if (motion) showKept(motion, keptMotionActions(app));
+      }),
+  };
+}
+
+function keptMotionActions({ page, playback }: AppParts): KeptMotionActions {
+  return {
+    toast: (message, ...actions) => page.toast(message, ...actions),
+    play: (motion) => void playback.playMotion(motion),
+    showDownloads: (motion) => {
+      page.panels.open("library");
+      page.library.showDownloads(motion);
+    },
+  };
+}
+
 function captureTarget(playback: RemotePlayback | null): CaptureTarget {
   return { session: playback?.kind === "sessions" ? playback.id : null, needsToken: pageAccess.hasToken };
 }
@@ -141,17 +168,12 @@ function createPageRecordAction(app: AppParts): () => Promise<void> {
   return createRecordAction({
     record: (session, name) =>
       app.stageHost.cameraKeyframes().then((camera) => recordSession(session, { name, camera })),
-    toast: (message, ...actions) => app.page.toast(message, ...actions),
+    ...keptMotionActions(app),
     session: () => {
       const { current } = app.playback;
       return current && { id: current.id, motionName: app.library.currentItem?.name ?? "" };
     },
     puppeteer: app.displayName,
     onRecorded: () => app.library.refresh(),
-    play: (motion) => void app.playback.playMotion(motion),
-    showDownloads: (motion) => {
-      app.page.panels.open("library");
-      app.page.library.showDownloads(motion);
-    },
   });
 }

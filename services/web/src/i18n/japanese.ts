@@ -105,8 +105,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Drop a dance, or an avatar to dance as": "踊りか、踊らせるアバターをドロップ",
   // live performers
   "Perform live": "生で踊る",
-  "Your own movement, from a motion capture tool, on this stage.":
-    "モーションキャプチャーのツールから、自分の動きをこの舞台に送れます。",
+  "Your own movement on this stage, from a motion capture tool. With a camera only: Strings, Use my camera.":
+    "モーションキャプチャーのツールから、自分の動きをこの舞台に送れます。カメラだけのときは、「糸」の「カメラを使う」から。",
   "Become a performer": "踊り手になる",
   "Ask whoever runs this server for a token that allows performing: {command}":
     "サーバーの管理者に、踊るためのトークンを発行してもらいます：{command}",
@@ -256,7 +256,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Drag a ring on the stage, or press {first} to {last}.": "舞台の輪をドラッグするか、{first}〜{last}を押します。",
   "Touch, gamepad and keys": "タッチ・ゲームパッド・キー",
   // camera
-  "Use my camera": "カメラで手を動かす",
+  "Use my camera": "カメラを使う",
   "Stop the camera": "カメラを止める",
   "Browsers allow the camera only on pages with HTTPS.": "カメラを使えるのは、HTTPSで開いたページだけです。",
   "The camera control could not be loaded. Check your connection, then try again":
@@ -272,6 +272,18 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Keep still for a moment": "しばらく動かないでください",
   "Raise your hands into the picture": "手を映る位置まで上げてください",
   "Your hands move the hands on the stage": "あなたの手が舞台の手を動かします",
+  "What to move": "動かすもの",
+  Hands: "手",
+  "Whole body": "全身",
+  "You are being brought on the stage": "舞台に上がるところです",
+  "You are live on the stage": "舞台に出演中です",
+  "You are live on the stage. Step back until your feet are in the picture to move your legs too":
+    "舞台に出演中です。足まで映る所に下がると、脚も動きます",
+  "The connection was lost, and is tried again": "接続が切れました。つなぎ直しています",
+  "You could not be brought on the stage": "舞台に上がれませんでした",
+  "Your performance has ended": "出演が終わりました",
+  "It was ended elsewhere, or the connection was lost for long. Try again to go on.":
+    "ほかの場所で終了されたか、接続が長く切れていました。続けるには、もう一度お試しください。",
   "The camera was switched off while this page was hidden": "ページが隠れている間にカメラを切りました",
   "The browser may not use the camera": "カメラの使用が許可されていません",
   "Allow the camera for this page, at the symbol beside the address, then try again.":
@@ -283,7 +295,7 @@ export const JAPANESE_PAGE_MESSAGES = {
     "カメラを使っているほかのプログラムやページを閉じて、もう一度お試しください。",
   "The camera has stopped": "カメラが止まりました",
   "Check that it is connected, then try again.": "つながっているか確かめて、もう一度お試しください。",
-  "Your hands cannot be detected here": "手を検出できません",
+  "You cannot be detected here": "姿を検出できません",
   "The detector could not be loaded or run. Check your connection, then try again, or use another browser.":
     "検出器を読み込めないか、実行できません。接続を確かめてもう一度お試しになるか、別のブラウザをお使いください。",
   right: "右",

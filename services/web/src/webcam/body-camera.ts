@@ -1,7 +1,5 @@
 /** A camera and the worker that detects the person before it. */
-import type { BodyMessage } from "../input/body-input";
 import { type CameraSource, closeCamera, openCamera } from "./camera";
-import { HandTracker, type TrackedHands } from "./hand-tracker";
 import type { DetectedBody } from "./landmark";
 import { PictureSource } from "./picture-source";
 import type { PictureMessage, WorkerMessage } from "./worker-message";
@@ -11,9 +9,12 @@ export class ModelError extends Error {
   override readonly name = "ModelError";
 }
 
-/** What the camera shows. */
-export interface CameraFrame extends TrackedHands {
+/** Picture of the camera. */
+export interface CameraFrame {
+  /** The person in it; null if there is none. */
   readonly body: DetectedBody | null;
+  /** Its width in its heights. */
+  readonly aspect: number;
   readonly video: HTMLVideoElement;
   /** Time of the picture, in milliseconds. */
   readonly now: number;
@@ -30,10 +31,7 @@ export interface BodyCameraOptions {
   onError(error: unknown): void;
 }
 
-export const NO_HANDS: BodyMessage = { left: null, right: null };
-
 export class BodyCamera {
-  readonly #tracker = new HandTracker();
   #stream: MediaStream | null = null;
   #pictures: PictureSource | null = null;
   #worker: Worker | null = null;
@@ -50,10 +48,6 @@ export class BodyCamera {
     this.#pictures?.close();
     if (this.#stream) closeCamera(this.#stream);
     this.#worker = this.#pictures = this.#stream = null;
-  }
-
-  recalibrate(): void {
-    this.#tracker.recalibrate();
   }
 
   async #open(): Promise<void> {
@@ -95,8 +89,7 @@ export class BodyCamera {
         // The next picture is detected while this one is shown.
         pictures.request();
         const { body, now } = message;
-        const tracked = this.#tracker.update(body, pictures.aspect, now / 1000);
-        this.options.onFrame({ ...tracked, body, video: pictures.video, now });
+        this.options.onFrame({ body, aspect: pictures.aspect, video: pictures.video, now });
         break;
       }
     }

@@ -1,16 +1,20 @@
-/** Arms of a person as a picture shows them. Pure. */
+/** A person as a picture shows them: arms, hips and feet. Pure. */
 import { type DetectedBody, LANDMARK, LANDMARK_STRIDE, visibilityOf } from "./landmark";
 
 export type Side = "left" | "right";
 export const SIDES: readonly Side[] = ["left", "right"];
 
-/**
- * Point of the picture: x to its right and y upwards from its centre, in heights of the picture; and how much nearer to
- * the camera than the shoulder, in metres of the model.
- */
-export interface ViewPoint {
+/** Focal length of a webcam in heights of its picture: a vertical field of view of 45 degrees. */
+export const FOCAL_LENGTH = 1.2;
+
+/** Point of the picture: x to its right and y upwards from its centre, in heights of the picture. */
+export interface PicturePoint {
   readonly x: number;
   readonly y: number;
+}
+
+/** Point of the picture, and how much nearer to the camera it is than the shoulder, in metres of the model. */
+export interface ViewPoint extends PicturePoint {
   readonly nearer: number;
 }
 
@@ -33,6 +37,10 @@ export interface BodyView {
   readonly right: ArmView;
   /** Heights of the picture per metre of the model, at the distance of the shoulders, by their width. */
   readonly scale: number;
+  /** Middle of the hips; null if one is not seen. */
+  readonly hips: PicturePoint | null;
+  /** Height of the lower ankle in the picture, as `PicturePoint.y`; null if an ankle is not seen. */
+  readonly lowerAnkle: number | null;
   /** Length of the trunk from shoulders to hips in heights of the picture; null if a hip is not seen. */
   readonly trunk: number | null;
   /** Distance of the shoulders in metres of the model. */
@@ -45,8 +53,8 @@ const EDGE = 0.01;
 const PALM_SHARE = 0.8;
 /** Smallest distance of the shoulders in the picture's plane for a scale, in metres of the model. */
 const MIN_WIDTH_M = 0.05;
-/** Visibility that the hips need. */
-const MIN_HIP_VISIBILITY = 0.6;
+/** Visibility that hips and ankles need. */
+const MIN_LEG_VISIBILITY = 0.6;
 
 /** Return the arms in a picture whose width is `aspect` heights; null if the shoulders are one behind the other. */
 export function viewBody(body: DetectedBody, aspect: number): BodyView | null {
@@ -57,26 +65,37 @@ export function viewBody(body: DetectedBody, aspect: number): BodyView | null {
   if (!(flatWidth > MIN_WIDTH_M)) return null;
   const [left, right] = SIDES.map((side) => viewArm(body, side, aspect));
   const pictured = Math.hypot(left.shoulder.x - right.shoulder.x, left.shoulder.y - right.shoulder.y);
+  const hips = viewPair(body, LANDMARK.leftHip, LANDMARK.rightHip, aspect);
+  const ankles = viewPair(body, LANDMARK.leftAnkle, LANDMARK.rightAnkle, aspect);
+  const middle = hips && { x: (hips[0].x + hips[1].x) / 2, y: (hips[0].y + hips[1].y) / 2 };
   return {
     left,
     right,
     scale: pictured / flatWidth,
-    trunk: measureTrunk(body, left, right, aspect),
+    hips: middle,
+    lowerAnkle: ankles && Math.min(ankles[0].y, ankles[1].y),
+    trunk:
+      middle &&
+      Math.hypot(
+        (left.shoulder.x + right.shoulder.x) / 2 - middle.x,
+        (left.shoulder.y + right.shoulder.y) / 2 - middle.y,
+      ),
     shoulderWidth: Math.hypot(...across),
   };
 }
 
-function measureTrunk({ image }: DetectedBody, left: ArmView, right: ArmView, aspect: number): number | null {
-  const hips = [LANDMARK.leftHip, LANDMARK.rightHip];
-  if (hips.some((hip) => visibilityInPicture(image, hip) < MIN_HIP_VISIBILITY)) return null;
-  const [leftHip, rightHip] = hips.map((hip) => pointInPicture(image, hip, aspect));
-  return Math.hypot(
-    (left.shoulder.x + right.shoulder.x - leftHip.x - rightHip.x) / 2,
-    (left.shoulder.y + right.shoulder.y - leftHip.y - rightHip.y) / 2,
-  );
+/** Return two landmarks of the legs; null if one is not seen. */
+function viewPair(
+  { image }: DetectedBody,
+  left: number,
+  right: number,
+  aspect: number,
+): [PicturePoint, PicturePoint] | null {
+  if (Math.min(visibilityInPicture(image, left), visibilityInPicture(image, right)) < MIN_LEG_VISIBILITY) return null;
+  return [pointInPicture(image, left, aspect), pointInPicture(image, right, aspect)];
 }
 
-function pointInPicture(image: Float64Array, landmark: number, aspect: number): { x: number; y: number } {
+function pointInPicture(image: Float64Array, landmark: number, aspect: number): PicturePoint {
   const at = landmark * LANDMARK_STRIDE;
   return { x: (image[at] - 0.5) * aspect, y: 0.5 - image[at + 1] };
 }

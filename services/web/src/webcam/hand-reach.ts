@@ -3,10 +3,8 @@
  * the perspective of a typical camera; the depth is the model's estimate. Pure.
  */
 import type { HandReach } from "../input/body-input";
-import type { ArmView, Side } from "./body-view";
+import { type ArmView, FOCAL_LENGTH, type Side } from "./body-view";
 
-/** Focal length of a webcam in heights of its picture: a vertical field of view of 45 degrees. */
-const FOCAL_LENGTH = 1.2;
 /** Share of the model's depth that is believed: it overestimates depth as often as it sees none. */
 const DEPTH_SHARE = 0.85;
 /** Smallest distance of a hand from the camera, in arm lengths. */

@@ -9,7 +9,15 @@ import { fakeCamera, writeFilm } from "../webcam/film";
 import { findViolations } from "./accessibility";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { waitInEngine } from "./engine-probe";
-import { LEFT_HAND, pauseAtStart, waitForFirstPose, waitForHold, waitForRelease } from "./page-probe";
+import { startPerformer } from "./live-performer";
+import {
+  LEFT_HAND,
+  pauseAtStart,
+  waitForFirstPose,
+  waitForHold,
+  waitForPerformers,
+  waitForRelease,
+} from "./page-probe";
 
 const RIGHT_HAND = 1;
 const FILM = join(tmpdir(), `bunraku-film-${process.pid}.y4m`);
@@ -59,7 +67,8 @@ async function startCamera(page: Page): Promise<void> {
   await page.getByRole("button", { name: "Use my camera" }).click();
 }
 
-describeInBrowser("webcam", { server: "open", browser: fakeCamera(FILM) }, ({ open }) => {
+describeInBrowser("webcam", { server: "open", browser: fakeCamera(FILM) }, (fixture) => {
+  const { open } = fixture;
   beforeAll(() => {
     const times = [...Array(30).fill(ARMS_DOWN_S), ...Array(60).fill(ARMS_ASIDE_S)];
     writeFilm(FILM, { times, view: { distance: 2.2, height: 1.15, fov: 45 } });
@@ -86,8 +95,8 @@ describeInBrowser("webcam", { server: "open", browser: fakeCamera(FILM) }, ({ op
       ["l_wrist", 1],
       ["r_wrist", -1],
     ] as const) {
-      await waitInEngine(page, isAside, { wrist, sign, from: 0.45, to: 2 });
-      await waitInEngine(page, isAside, { wrist, sign, from: -1, to: 0.35 });
+      await waitInEngine(page, isAside, { wrist, sign, from: 0.45, to: 2, performer: 0 });
+      await waitInEngine(page, isAside, { wrist, sign, from: -1, to: 0.35, performer: 0 });
     }
     expect(await findViolations(page)).toEqual([]);
     expect(await trackStates(page)).toEqual(["live"]);
@@ -114,12 +123,65 @@ describeInBrowser("webcam", { server: "open", browser: fakeCamera(FILM) }, ({ op
     ]);
   });
 
+  test("the whole body before it is a live performer, whose motion is kept", async () => {
+    const page = await open("?name=Aiko", { ...OPTIONS, before: recordTracks });
+    await startCamera(page);
+    const card = page.getByRole("region", { name: "Camera" });
+    await waitForHold(page, LEFT_HAND);
+    await card.getByText("Whole body").click();
+    await waitForRelease(page, LEFT_HAND);
+    await card.getByText("You are live on the stage").waitFor();
+    await waitForPerformers(page, 2);
+    expect(await page.locator(".live").innerText()).toMatch(/^Live\s+Aiko$/);
+    // The second performer: true to the side, not as in a mirror, and while the first one dances on.
+    for (const [wrist, sign] of [
+      ["l_wrist", 1],
+      ["r_wrist", -1],
+    ] as const) {
+      await waitInEngine(page, isAside, { wrist, sign, from: 0.45, to: 2, performer: 1 });
+      await waitInEngine(page, isAside, { wrist, sign, from: -1, to: 0.35, performer: 1 });
+    }
+    expect(await findViolations(page)).toEqual([]);
+    await card.getByRole("button", { name: "Stop the camera" }).click();
+    await waitForPerformers(page, 1);
+    expect(await trackStates(page)).toEqual(["ended"]);
+    await page.getByText(/^Kept: Aiko/).waitFor();
+    await page.getByRole("button", { name: "Dance it" }).click();
+    await page.locator(".brand-piece").getByText(/^Aiko/).waitFor();
+  });
+
+  test("a performer for whom the stage has no room, and one who is ended elsewhere, can try again", async () => {
+    const others = [];
+    for (const [number, name] of ["Ben", "Chie", "Dai"].entries())
+      others.push(await startPerformer(fixture, name, [number - 1, -1, 0]));
+    const page = await open("?name=Aiko", OPTIONS);
+    await startCamera(page);
+    const card = page.getByRole("region", { name: "Camera" });
+    await card.getByText("Whole body").click();
+    await card.getByRole("alert").waitFor();
+    expect(await card.getByRole("alert").innerText()).toMatch(/performers/);
+    await others[0].end();
+    const created = page.waitForResponse((response) => response.url().endsWith("/v1/performers") && response.ok());
+    await card.getByRole("button", { name: "Try again" }).click();
+    await card.getByText(/^You are live on the stage/).waitFor();
+    expect(await card.getByRole("alert").isVisible()).toBe(false);
+
+    const { id } = (await (await created).json()) as { id: string };
+    await fixture.request("DELETE", `/v1/performers/${id}`);
+    await card.getByRole("alert").getByText("Your performance has ended").waitFor();
+    await card.getByRole("button", { name: "Try again" }).click();
+    await card.getByText(/^You are live on the stage/).waitFor();
+    await card.getByRole("button", { name: "Stop the camera" }).click();
+    for (const other of others.slice(1)) await other.end();
+    await waitForPerformers(page, 1);
+  });
+
   test("loading is shown, can be cancelled, and a model that does not arrive is reported", async () => {
     const page = await open("", { ...OPTIONS, before: recordTracks });
     await page.context().route("**/*.tflite", (route) => route.abort());
     await startCamera(page);
     const card = page.getByRole("region", { name: "Camera" });
-    await card.getByRole("alert").getByText("Your hands cannot be detected here").waitFor();
+    await card.getByRole("alert").getByText("You cannot be detected here").waitFor();
     expect(await findViolations(page)).toEqual([]);
     expect(await trackStates(page)).toEqual(["ended"]);
     let release = (): void => undefined;
@@ -171,17 +233,24 @@ describeInBrowser("webcam of a browser without a camera", { server: "open" }, ({
     const japanese = await open("?lang=ja", OPTIONS);
     await waitForFirstPose(japanese);
     await japanese.getByRole("button", { name: "糸", exact: true }).click();
-    await japanese.getByRole("button", { name: "カメラで手を動かす" }).click();
+    await japanese.getByRole("button", { name: "カメラを使う" }).click();
     await japanese.getByRole("alert").getByText("カメラがありません").waitFor();
   });
 });
 
-/** Whether a wrist is between two distances from the chest, to the side of `sign`. */
-function isAside({ wrist, sign, from, to }: { wrist: string; sign: number; from: number; to: number }): boolean {
-  const { scene } = globalThis.bunraku.stage;
-  const at = scene.getObjectByName(wrist)?.matrixWorld.elements;
-  const chest = scene.getObjectByName("vl5")?.matrixWorld.elements;
-  if (!at || !chest) return false;
+interface Aside {
+  readonly wrist: string;
+  readonly sign: number;
+  readonly from: number;
+  readonly to: number;
+  readonly performer: number;
+}
+
+/** Whether a performer's wrist is between two distances from the chest, to the side of `sign`. */
+function isAside({ wrist, sign, from, to, performer }: Aside): boolean {
+  const figure = globalThis.bunraku.stage.performers[performer];
+  if (!figure) return false;
+  const [at, chest] = [figure.joint(wrist).elements, figure.joint("vl5").elements];
   const distance = [0, 1, 2].reduce((sum, axis) => sum + chest[axis] * (at[12 + axis] - chest[12 + axis]), 0) * sign;
   return distance > from && distance < to;
 }

@@ -59,31 +59,6 @@ export function landmarksOf(figure: Figure, pose: Pose, visibility = 1): Float64
   return landmarks;
 }
 
-/**
- * Return a straight figure: its bones lie along the axes that the rotations are relative to, as far as the landmarks
- * show them.
- */
-export function straightFigure(): Figure {
-  const offsets = new Float64Array(54);
-  const set = (joint: string, x: number, y: number, z: number) => offsets.set([x, y, z], JOINTS.indexOf(joint) * 3);
-  set("sacroiliac", 0, 0.1, 0);
-  set("vl5", 0, 0.25, 0);
-  set("skullbase", 0, 0.5, 0);
-  for (const [side, sign] of [
-    ["l", 1],
-    ["r", -1],
-  ] as const) {
-    set(`${side}_hip`, sign * 0.1, 0, 0);
-    set(`${side}_knee`, 0, -0.42, 0);
-    set(`${side}_ankle`, 0, -0.42, 0);
-    set(`${side}_midtarsal`, 0, -0.06, 0.1);
-    set(`${side}_shoulder`, sign * 0.2, 0.35, 0);
-    set(`${side}_elbow`, 0, -0.3, 0);
-    set(`${side}_wrist`, 0, -0.27, 0);
-  }
-  return { offsets, tips: new Float64Array(54) };
-}
-
 const angle = (limit: number) => fc.double({ min: -limit, max: limit, noNaN: true });
 const bend = fc.double({ min: 0.5, max: 2.2, noNaN: true });
 const turn = (limit: number) => fc.tuple(angle(limit), angle(limit), angle(limit));

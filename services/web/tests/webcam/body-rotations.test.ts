@@ -2,11 +2,12 @@ import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import { rotate } from "../../src/motion/rotation";
 import { createWorldTransforms, JOINTS, restPose, worldTransforms } from "../../src/motion/skeleton";
+import { bodyFigure } from "../../src/webcam/body-figure";
 import { BodyRotations } from "../../src/webcam/body-rotations";
 import { LANDMARK, LANDMARK_STRIDE } from "../../src/webcam/landmark";
-import { anyPose, determinedPose, landmarksOf, straightFigure, turned } from "./arbitrary-body";
+import { anyPose, determinedPose, landmarksOf, turned } from "./arbitrary-body";
 
-const figure = straightFigure();
+const figure = bodyFigure();
 
 /** Return the largest angle in radians between the rotations of two poses, over the joints. */
 function largestDifference(a: Float64Array, b: Float64Array, joints = JOINTS): number {

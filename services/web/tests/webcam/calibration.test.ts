@@ -1,8 +1,9 @@
 import { describe, expect, test } from "vitest";
+import { ARM_M } from "../../src/webcam/body-figure";
 import { viewBody } from "../../src/webcam/body-view";
 import { Calibration, STILL_S } from "../../src/webcam/calibration";
 import type { DetectedBody } from "../../src/webcam/landmark";
-import { ARM_M, ASPECT, detect, hide, SHOULDER_WIDTH_M } from "./detected-body";
+import { ASPECT, detect, hide, SHOULDER_WIDTH_M } from "./detected-body";
 import { ARMS_DOWN, RIGHT_FOREARM_AHEAD } from "./poses";
 
 const FPS = 10;

@@ -1,9 +1,10 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Pose } from "../../src/motion/skeleton";
+import { ARM_M } from "../../src/webcam/body-figure";
 import { SIDES, viewBody } from "../../src/webcam/body-view";
 import { handReach } from "../../src/webcam/hand-reach";
-import { ARM_M, ASPECT, type DetectionOptions, detect, trueReach } from "./detected-body";
+import { ASPECT, type DetectionOptions, detect, trueReach } from "./detected-body";
 import { ARMS_ASIDE, ARMS_DOWN, LEFT_UP, poseWith, RIGHT_FOREARM_AHEAD } from "./poses";
 
 function reachOf(pose: Pose, side: "left" | "right", options: DetectionOptions = {}) {

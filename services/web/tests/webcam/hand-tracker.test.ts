@@ -1,7 +1,7 @@
 import { describe, expect, test } from "vitest";
 import type { HandState } from "../../src/input/body-input";
 import { STILL_S } from "../../src/webcam/calibration";
-import { FORGET_S, HandTracker, type TrackedHands } from "../../src/webcam/hand-tracker";
+import { HandTracker, type TrackedHands } from "../../src/webcam/hand-tracker";
 import { type DetectedBody, LANDMARK, LANDMARK_STRIDE } from "../../src/webcam/landmark";
 import { HOLD_S } from "../../src/webcam/visibility-gate";
 import { ASPECT, type DetectionOptions, detect, hide, trueReach } from "./detected-body";
@@ -33,31 +33,6 @@ function expectReach(state: HandState, expected: readonly number[], digits = 2):
   expect(state).toHaveLength(3);
   expected.forEach((value, axis) => void expect(state?.[axis]).toBeCloseTo(value, digits));
 }
-
-describe("phases", () => {
-  test("search, calibration, following", () => {
-    const session = new Session();
-    expect(session.show(null, 1)).toMatchObject({ phase: "searching", progress: 0 });
-    const calibrating = session.show(detect(ARMS_DOWN), STILL_S / 2);
-    expect(calibrating).toMatchObject({ phase: "calibrating", hands: { left: null, right: null } });
-    expect(calibrating.progress).toBeGreaterThan(0.3);
-    expect(session.show(detect(ARMS_DOWN), STILL_S)).toMatchObject({ phase: "following", progress: 1 });
-  });
-
-  test("a person who returns goes on; one who comes later is calibrated", () => {
-    const session = calibrated();
-    expect(session.show(null, FORGET_S / 2).phase).toBe("searching");
-    expect(session.show(detect(ARMS_DOWN), 0.1).phase).toBe("following");
-    session.show(null, FORGET_S + 1);
-    expect(session.show(detect(ARMS_DOWN), 0.1).phase).toBe("calibrating");
-  });
-
-  test("calibration on request", () => {
-    const session = calibrated();
-    session.tracker.recalibrate();
-    expect(session.show(detect(ARMS_DOWN), 0.1).phase).toBe("calibrating");
-  });
-});
 
 describe("hands", () => {
   test.each([{ distance: 3 }, { distance: 3, modelScale: 0.7 }, { distance: 4, right: 0.3 }])(

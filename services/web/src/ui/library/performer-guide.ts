@@ -41,7 +41,13 @@ export function createPerformerGuide(captureTarget: () => CaptureTarget): HTMLEl
     "section",
     { class: "perform", "aria-labelledby": "perform" },
     element("h3", { id: "perform" }, translate("Perform live")),
-    element("p", { class: "muted" }, translate("Your own movement, from a motion capture tool, on this stage.")),
+    element(
+      "p",
+      { class: "muted" },
+      translate(
+        "Your own movement on this stage, from a motion capture tool. With a camera only: Strings, Use my camera.",
+      ),
+    ),
     toggle,
     steps,
   );

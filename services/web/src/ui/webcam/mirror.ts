@@ -1,5 +1,4 @@
 /** Small mirrored view of the person before the camera: the outline, over the darkened picture or without it. */
-import type { HandState } from "../../input/body-input";
 import type { DetectedBody } from "../../webcam/landmark";
 import { element } from "../dom";
 import { type Outline, outlineOf } from "./outline";
@@ -13,7 +12,8 @@ const HAND_RADIUS = 11;
 export interface MirrorContent {
   readonly video: HTMLVideoElement;
   readonly body: DetectedBody | null;
-  readonly hands: { readonly left: HandState; readonly right: HandState };
+  /** Hands that move something on the stage. */
+  readonly activeHands: { readonly left: boolean; readonly right: boolean };
 }
 
 export interface Mirror {
@@ -37,7 +37,7 @@ export function createMirror(): Mirror {
     const style = getComputedStyle(canvas);
     const outline = outlineOf(content.body, MIRROR_WIDTH, MIRROR_HEIGHT);
     drawLines(context, outline, style.color);
-    drawHands(context, outline, content.hands, style.getPropertyValue("--gold"));
+    drawHands(context, outline, content.activeHands, style.getPropertyValue("--gold"));
   };
   return {
     element: canvas,
@@ -78,11 +78,11 @@ function drawLines(context: CanvasRenderingContext2D, { lines, head }: Outline, 
   context.stroke();
 }
 
-/** Draw a disc for a hand that moves the performer, and a ring for one that does not. */
+/** Draw a disc for an active hand, and a ring for one that does not. */
 function drawHands(
   context: CanvasRenderingContext2D,
   { hands }: Outline,
-  states: MirrorContent["hands"],
+  isActive: MirrorContent["activeHands"],
   colour: string,
 ): void {
   Object.assign(context, { lineWidth: LINE_WIDTH, strokeStyle: colour, fillStyle: colour });
@@ -91,7 +91,7 @@ function drawHands(
     if (!at) continue;
     context.beginPath();
     context.arc(...at, HAND_RADIUS, 0, 2 * Math.PI);
-    if (states[side] !== null && states[side] !== "hold") context.fill();
+    if (isActive[side]) context.fill();
     else context.stroke();
   }
 }

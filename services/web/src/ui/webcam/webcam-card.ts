@@ -6,21 +6,29 @@ import { element, setAttribute, setText } from "../dom";
 import { icon } from "../icon";
 import { createMirror, type Mirror } from "./mirror";
 
+/** What the person does on the stage. */
+export type ModeName = "hands" | "performer";
+
+const MODE_LABELS: Readonly<Record<ModeName, PlainMessageKey>> = { hands: "Hands", performer: "Whole body" };
+
 export interface WebcamActions {
   stop(): void;
   recalibrate(): void;
   retry(): void;
+  choose(mode: ModeName): void;
 }
 
 /** Problem for the person: what it is, and what to do about it. */
 export interface WebcamProblem {
-  readonly cause: PlainMessageKey;
-  readonly remedy: PlainMessageKey;
+  readonly cause: string;
+  readonly remedy: string;
 }
 
 export interface WebcamCard {
   readonly element: HTMLElement;
   readonly mirror: Mirror;
+  /** Offer these modes, of which the first is chosen. */
+  setModes(modes: readonly ModeName[]): void;
   /** Show what happens. */
   setStatus(text: string): void;
   /** Show the share of something that has been done, 0 to 1; null hides it. */
@@ -34,6 +42,7 @@ export interface WebcamCard {
 
 export function createWebcamCard(root: HTMLElement, actions: WebcamActions): WebcamCard {
   const mirror = createMirror();
+  const modes = element("div", { class: "webcam-modes", role: "radiogroup", "aria-label": translate("What to move") });
   const status = element("p", { class: "webcam-status", role: "status" });
   const bar = element("i");
   const progress = element("div", { class: "progress", role: "progressbar", hidden: true }, bar);
@@ -64,6 +73,7 @@ export function createWebcamCard(root: HTMLElement, actions: WebcamActions): Web
   const card = element(
     "section",
     { class: "webcam", "aria-label": translate("Camera") },
+    modes,
     mirror.element,
     progress,
     problem,
@@ -74,6 +84,16 @@ export function createWebcamCard(root: HTMLElement, actions: WebcamActions): Web
   return {
     element: card,
     mirror,
+    setModes(names) {
+      modes.hidden = names.length < 2;
+      modes.replaceChildren(
+        ...names.map((name, index) => {
+          const onChange = () => actions.choose(name);
+          const radio = element("input", { type: "radio", name: "webcam-mode", checked: index === 0, onChange });
+          return element("label", {}, radio, element("span", {}, translate(MODE_LABELS[name])));
+        }),
+      );
+    },
     setStatus: (text) => setText(status, text),
     setProgress(share) {
       progress.hidden = share === null;
@@ -87,7 +107,7 @@ export function createWebcamCard(root: HTMLElement, actions: WebcamActions): Web
       problem.hidden = shown === null;
       mirror.element.hidden = status.hidden = picture.hidden = shown !== null;
       retry.hidden = shown === null;
-      if (shown) problem.replaceChildren(element("b", {}, translate(shown.cause)), translate(shown.remedy));
+      if (shown) problem.replaceChildren(element("b", {}, shown.cause), shown.remedy);
     },
     setFollowing(isFollowing) {
       again.hidden = !isFollowing;
