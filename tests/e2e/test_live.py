@@ -103,6 +103,7 @@ async def test_performer_is_seen_and_controlled_and_becomes_a_motion(tmp_path: P
                     assert viewer.presence is not None
                     assert viewer.presence.live == [{"performer": 0, "id": performer.description["id"], "name": "Aiko"}]
                     assert (await performer.describe())["samples"]["applied"] > 50
+                    assert (await client.session(session))["base"] is None
                     # one second of what is seen, compared with what was sent a moment before
                     shown = {at: pose for at, pose in seen.items() if at > max(seen) - 500_000}
                     lag = min(range(0, 400_000, 5_000), key=lambda lag: deviation(shown, sent, lag))
@@ -180,6 +181,8 @@ async def test_performer_joins_a_running_dance_and_leaves_it(tmp_path: Path, cli
                     async with sending(aiko), sending(yuki):
                         await wait_for_live(viewer, 20)
                         assert len(viewer.performers) == 3
+                    described = await client.session(session)
+                    assert described["base"] == dance != described["motion"]
                     async with client.perform(session=session) as fourth:
                         assert fourth.description["performer"] == 3
                         with pytest.raises(ServerProblem) as full:
@@ -189,8 +192,9 @@ async def test_performer_joins_a_running_dance_and_leaves_it(tmp_path: Path, cli
                     # another dance keeps its live performers
                     await client.edit_session(session, motion=(await client.upload(clip_file))["id"])
                     assert (await aiko.describe())["performer"] == 1
-                assert (await client.session(session))["motion"] == dance
-                assert len((await client.session(session))["limbs"]) == 4
+                described = await client.session(session)
+                assert described["motion"] == described["base"] == dance
+                assert len(described["limbs"]) == 4
 
 
 async def test_second_connection_replaces_the_first_and_end_closes_it(tmp_path: Path) -> None:

@@ -247,6 +247,7 @@ def session_json(stage: Stage, now: int) -> dict[str, Any]:
     return {
         "id": stage.id,
         "motion": state.motion,
+        "base": (stage.cast.base if stage.cast.members else state.motion) or None,
         "playing": state.playing,
         "loop": state.loop,
         "position": position_at(state, now),

@@ -21,7 +21,8 @@ export class LibraryController {
   }
 
   get #currentMotion(): string | null {
-    return this.getPlayback()?.motion ?? null;
+    const { motion = null, base = null } = this.getPlayback() ?? {};
+    return this.motions.find(motion) ? motion : base;
   }
 
   /** Fetch the list and display it. Rejects with ProblemError. */

@@ -1,6 +1,6 @@
 /** Playback of the page: enter a session or a motion, show its state, and replace it by another. */
 import { pageAccess } from "../client/access";
-import { createSession, findOrCreateSession } from "../client/api";
+import { createSession, findOrCreateSession, getSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import type { EngineCommand, PlaybackChange, ViewerTime } from "../engine/message";
 import type { PlaybackKind } from "../engine/playback";
@@ -152,10 +152,23 @@ export class PlaybackController {
     const updatePerformers = () => avatarSlots.restore(playback.performerCount);
     playback.addEventListener("figure", () => {
       updatePerformers();
-      if (!library.motions.find(playback.motion)) void library.refresh().catch(() => undefined);
       library.render();
+      void this.#findMotion(playback).catch(() => undefined);
     });
     playback.addEventListener("tracks", updatePerformers);
+  }
+
+  /** Find the motion in the library: a new one, or that which is played with live performers. */
+  async #findMotion(playback: RemotePlayback): Promise<void> {
+    const { library } = this.options;
+    const { id, kind, motion } = playback;
+    if (library.motions.find(motion)) return;
+    await library.refresh();
+    if (library.motions.find(motion) || kind !== "sessions") return;
+    const { base } = await getSession(id);
+    if (playback.motion !== motion) return;
+    playback.base = base;
+    library.render();
   }
 
   #bindTransport(playback: RemotePlayback): void {

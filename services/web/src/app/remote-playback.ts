@@ -40,6 +40,8 @@ export class RemotePlayback extends EventTarget implements SoundSource {
   isClosed = false;
   presence: Presence | null = null;
   motion: string | null = null;
+  /** Motion of the library that `motion` is made of, as far as it is known: another one with live performers. */
+  base: string | null = null;
   performerCount = 0;
   /** Duration of the motion in seconds, 0 before it is known. */
   duration = 0;

@@ -28,6 +28,8 @@ export interface Motion {
 export interface Session {
   id: string;
   motion: string;
+  /** Motion of the library that `motion` is made of: another one with live performers; null if they are alone. */
+  base: string | null;
   playing: boolean;
   loop: boolean;
   position: number;

@@ -73,6 +73,9 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
     await waitForFirstPose(page);
     await waitForWelcome(page);
     expect(await page.locator(".live").isVisible()).toBe(false);
+    const piece = page.locator(".brand-piece");
+    const name = await piece.innerText();
+    expect(name).not.toBe("");
 
     const performer = await startPerformer(fixture, "Ben", [1, 0, 0]);
     expect(performer.performer).toBe(1);
@@ -80,6 +83,7 @@ describeInBrowser("live performers", { server: "open" }, (fixture) => {
     const badge = page.locator(".live");
     await badge.waitFor();
     expect(await badge.innerText()).toMatch(/^Live\s+Ben$/);
+    await expect.poll(() => piece.innerText()).toBe(name);
     // The session is paused; the performer moves as it dances.
     const moving = await jointOfSecond(page, "l_wrist");
     await waitInEngine(
