@@ -37,8 +37,8 @@ function nameShared(id: string, context: Rolldown.ChunkingContext): string | nul
 }
 
 /**
- * Adds links to the scripts before the first frame. Browsers preload modules for the page only; `prefetch` gets those of
- * the worker into the HTTP cache.
+ * Adds links to the scripts before the first frame. Browsers preload modules for the page only; `prefetch` gets those
+ * of the worker into the HTTP cache.
  */
 export const preloadScripts: Plugin = {
   name: "preload-scripts",

@@ -1,4 +1,7 @@
-/** Public interface of the npm package `bunraku`: element, viewer, puppeteer, performer, stage, and wire format decoders. */
+/**
+ * Public interface of the npm package `bunraku`: element, viewer, puppeteer, performer, stage, and wire format
+ * decoders.
+ */
 
 export { Access, type Role, tabToken } from "./client/access";
 export type { LivePerformer, PerformerFigure } from "./client/api";

@@ -1,6 +1,6 @@
 /**
- * Code of three.js's shaders that only avatars need. The build of the page removes it from the stage's shaders and puts it
- * here (`vite.shaders.ts`); other builds remove nothing.
+ * Code of three.js's shaders that only avatars need. The build of the page removes it from the stage's shaders and puts
+ * it here (`vite.shaders.ts`); other builds remove nothing.
  */
 
 /** Removed code by the name of its chunk, in the order of the `#error` directives in its place. */

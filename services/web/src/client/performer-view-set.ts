@@ -68,8 +68,8 @@ export class PerformerViewSet {
   }
 
   /**
-   * Add live poses that arrived at local `nowMs`; return the number of damaged blocks. Messages that arrive before their
-   * decoder has been loaded are left out: none depends on another.
+   * Add live poses that arrived at local `nowMs`; return the number of damaged blocks. Messages that arrive before
+   * their decoder has been loaded are left out: none depends on another.
    */
   putLive(message: Live, nowMs: number): number {
     if (this.live) return this.live.put(message, nowMs);

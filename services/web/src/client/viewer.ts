@@ -179,8 +179,8 @@ export class Viewer extends EventTarget {
 
   /**
    * Return the pose of a performer at local `nowMs`, placed on the stage: the motion or the live pose, the overlays of
-   * controlled limbs, and the predictions of this page's own. Null before the first pose; while a block is missing the last pose is kept.
-   * The next call for this performer reuses the storage.
+   * controlled limbs, and the predictions of this page's own. Null before the first pose; while a block is missing the
+   * last pose is kept. The next call for this performer reuses the storage.
    */
   poseAt(nowMs: number, performer = 0): Pose | null {
     const clock = this.presentationTime(nowMs);

@@ -1,6 +1,7 @@
 /**
- * An immersive session: shows the stage of the engine in the room of the viewer, and passes the viewer's hands to it. The
- * engine stays where it is, with its connections and claims; each of its frames is requested by one of the headset's.
+ * An immersive session: shows the stage of the engine in the room of the viewer, and passes the viewer's hands to it.
+ * The engine stays where it is, with its connections and claims; each of its frames is requested by one of the
+ * headset's.
  */
 import { Matrix4, type Vector3, type WebGLRenderer } from "three";
 import { AvatarModels } from "../engine/avatar-models";

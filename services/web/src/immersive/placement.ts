@@ -87,7 +87,9 @@ export class Placement {
     this.#update();
   }
 
-  /** Return true if a place of the stage is too far from the stage's centre to be reached from where the viewer stands. */
+  /**
+   * Return true if a place of the stage is too far from the stage's centre to be reached from where the viewer stands.
+   */
   isFar({ x, z }: Vector3): boolean {
     return Math.hypot(x - this.#centre.x, z - this.#centre.z) > MAX_DISTANCE_M;
   }
@@ -100,7 +102,10 @@ export class Placement {
   }
 }
 
-/** Return the horizontal direction that a viewer looks at. Who looks straight up or down faces where the head's top does. */
+/**
+ * Return the horizontal direction that a viewer looks at. Who looks straight up or down faces where the head's top
+ * does.
+ */
 function headingOf(viewer: Matrix4): Vector3 {
   const ahead = new Vector3().setFromMatrixColumn(viewer, 2).negate();
   const up = new Vector3().setFromMatrixColumn(viewer, 1).multiplyScalar(-Math.sign(ahead.y));

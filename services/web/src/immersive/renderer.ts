@@ -34,8 +34,8 @@ export function createImmersiveRenderer(antialias: boolean): WebGLRenderer {
 }
 
 /**
- * Draw a frame to the headset. `camera` is in the frame of the room, which may be larger than the scene's: a viewer of a
- * small stage is a giant in it. World matrices are up to date.
+ * Draw a frame to the headset. `camera` is in the frame of the room, which may be larger than the scene's: a viewer of
+ * a small stage is a giant in it. World matrices are up to date.
  */
 export function drawFrame(renderer: WebGLRenderer, scene: Scene, camera: PerspectiveCamera): void {
   const { xr } = renderer;

@@ -8,8 +8,8 @@ import { LIVE_FRAME_INTERVAL_US, type LiveBlock } from "../wire/live";
 import { LiveLatency } from "./live-latency";
 
 /**
- * Longest gap between messages that is bridged, and time for which the last pose is held, microseconds: on a constrained
- * link, blocks of the stored motion delay the first messages by 0.4 s.
+ * Longest gap between messages that is bridged, and time for which the last pose is held, microseconds: on a
+ * constrained link, blocks of the stored motion delay the first messages by 0.4 s.
  */
 export const LIVE_HOLD_US = 500_000;
 /** Capacity of the buffer: four seconds. */

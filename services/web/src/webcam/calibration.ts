@@ -1,7 +1,7 @@
 /**
  * Calibration by standing still: the length of the person's arms in metres of the model, which knows nobody's size. The
- * arms give it if they hang in view, else the shoulders, so that it also works for a person who sits at a desk. The size
- * of the person in the picture is kept too, as the reference for later pictures. Pure.
+ * arms give it if they hang in view, else the shoulders, so that it also works for a person who sits at a desk. The
+ * size of the person in the picture is kept too, as the reference for later pictures. Pure.
  */
 import { type ArmView, type BodyView, SIDES } from "./body-view";
 

@@ -1,6 +1,6 @@
 /**
- * Decoding of MediaPipe's `NormalizedLandmarkList` and `LandmarkList` (Protocol Buffers): repeated field 1, a message of
- * the 32-bit floats x (1), y (2), z (3), visibility (4) and presence (5). Pure.
+ * Decoding of MediaPipe's `NormalizedLandmarkList` and `LandmarkList` (Protocol Buffers): repeated field 1, a message
+ * of the 32-bit floats x (1), y (2), z (3), visibility (4) and presence (5). Pure.
  */
 import { LANDMARK_COUNT, LANDMARK_STRIDE } from "./landmark";
 

@@ -1,6 +1,6 @@
 /**
- * Landmarks of a body as BlazePose finds them: 33 points, each x, y, z and visibility (0 to 1). Left and right are those
- * of the person. Pure.
+ * Landmarks of a body as BlazePose finds them: 33 points, each x, y, z and visibility (0 to 1). Left and right are
+ * those of the person. Pure.
  */
 
 export const LANDMARK_COUNT = 33;

@@ -1,4 +1,6 @@
-/** Encoder of a viewer's and a puppeteer's messages, and decoder of a server's, without the code of the other direction. */
+/**
+ * Encoder of a viewer's and a puppeteer's messages, and decoder of a server's, without the code of the other direction.
+ */
 
 import { MalformedMessage } from "./errors";
 import { packInput, packPing, unpackData, unpackPong } from "./fixed-message";

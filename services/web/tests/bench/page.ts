@@ -6,7 +6,8 @@
  *   with the puppet; median of five newly started browsers with empty caches. `js_gzip_kb` and `fonts_kb` are all
  *   scripts and fonts loaded until a hand is held.
  * - `line`: `first_paint_1mbit_s` is the same at 1 Mbit/s and 100 ms RTT, emulated by Chromium, WebSockets included.
- * - `frames`: cost of a frame with 4x CPU slowdown, full quality and three controlled limbs. All figures are thread time
+ * - `frames`: cost of a frame with 4x CPU slowdown, full quality and three controlled limbs. All figures are thread
+ *   time
  *   from Chromium's trace, which excludes waits for a processor and the GPU process. If the stage is drawn in a worker,
  *   `main_ms_p95` is the time of the page's animation frame callbacks and of messages from one of its animation frames to
  *   the next, without layout and painting, which are in a note, and `worker_ms_p95` is the worker's time for an animation frame callback that draws. Chromium

@@ -1,7 +1,7 @@
 /**
- * Benchmark of the control by webcam, in Chromium: `make bench-webcam`, or `make bench-webcam ARGUMENTS="--seconds 20"`.
- * Chromium's fake camera shows the film of a modelled person (`tests/webcam`), whose pose is known in every picture,
- * from two distances. It prints a table, and a JSON object as its last line:
+ * Benchmark of the control by webcam, in Chromium: `make bench-webcam`, or `make bench-webcam ARGUMENTS="--seconds
+ * 20"`. Chromium's fake camera shows the film of a modelled person (`tests/webcam`), whose pose is known in every
+ * picture, from two distances. It prints a table, and a JSON object as its last line:
  *
  * - `webcam_hand_cm_median`: distance of the performer's hand, in the frames that are drawn, from where the person's
  *   hand is in the newest picture that the frame shows, relative to the shoulder and for a performer of the person's

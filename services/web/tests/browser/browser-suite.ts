@@ -1,4 +1,6 @@
-/** Test suites that run in Chromium against a server. They share browsers and servers; each test has its own session. */
+/**
+ * Test suites that run in Chromium against a server. They share browsers and servers; each test has its own session.
+ */
 import { randomUUID } from "node:crypto";
 import type { Browser, BrowserContextOptions, Page } from "playwright-core";
 import { afterAll, beforeAll, beforeEach, describe, onTestFinished } from "vitest";

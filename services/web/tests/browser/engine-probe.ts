@@ -45,7 +45,9 @@ const REALM_LOSS = /Execution context was destroyed|Worker was closed|has been c
 /** Realms found, until the page navigates or the worker ends. */
 const knownEngines = new WeakMap<Page, Realm>();
 
-/** Return the worker of the page that runs the engine's script, whether or not it has started; null if there is none. */
+/**
+ * Return the worker of the page that runs the engine's script, whether or not it has started; null if there is none.
+ */
 export function engineWorker(page: Page): Worker | null {
   return page.workers().find((worker) => ENGINE_SCRIPT.test(worker.url())) ?? null;
 }

@@ -44,8 +44,8 @@ export async function tapKey(page: Page, key: string): Promise<void> {
 }
 
 /**
- * Run `action` and wait for a toast with `text`. Toasts are brief: the page looks for it at every frame, from before the
- * action.
+ * Run `action` and wait for a toast with `text`. Toasts are brief: the page looks for it at every frame, from before
+ * the action.
  */
 export async function waitForToast<T>(page: Page, text: string, action: () => Promise<T>): Promise<T> {
   const shown = page.waitForFunction(

@@ -37,7 +37,8 @@ describeInBrowser("screen layout", { server: "open" }, ({ open }) => {
     for (const [width, height] of WINDOWS) {
       await page.setViewportSize({ width, height });
       await waitForDraw(page);
-      // Poll, because the new size takes some frames. In a low window the bars are at its top, with little room for tags.
+      // Poll, because the new size takes some frames. In a low window the bars are at its top, with little room for
+      // tags.
       const minTags = height < LOW_WINDOW_PX ? 1 : 5;
       await expect
         .poll(

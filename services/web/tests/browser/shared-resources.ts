@@ -31,7 +31,9 @@ export class SharedResources {
     return this.#once(`server ${kind}`, () => this.#startServer(kind));
   }
 
-  /** Return the endpoint of a browser with these flags. Each worker has its own, because browsers draw in one thread. */
+  /**
+   * Return the endpoint of a browser with these flags. Each worker has its own, because browsers draw in one thread.
+   */
   browser(worker: string, flags: readonly string[]): Promise<string> {
     return this.#once(`browser ${worker} ${flags.join(" ")}`, async () => {
       const browser = await launchSharedChromium(chromiumPath() ?? "", flags);

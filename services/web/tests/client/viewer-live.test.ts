@@ -31,7 +31,9 @@ const golden = loadVectors<LiveVectors>("live");
 const PLACE = [2, -1, 0.5];
 const [one, two, , four] = golden.valid.map(({ block }) => decodeBase64(block));
 
-/** Open a viewer of a stored performer and one whose live blocks are the golden ones; the decoder of these is loaded. */
+/**
+ * Open a viewer of a stored performer and one whose live blocks are the golden ones; the decoder of these is loaded.
+ */
 async function openLiveViewer(motion = "dance"): Promise<void> {
   createViewer();
   FakeWebSocket.last.accept();

@@ -94,8 +94,8 @@ const PREFERENCES = {
 };
 
 /**
- * Messages that are no errors of a page: a font that was loading when the page was left (NS_BINDING_ABORTED), and sockets
- * that it opens again.
+ * Messages that are no errors of a page: a font that was loading when the page was left (NS_BINDING_ABORTED), and
+ * sockets that it opens again.
  */
 const NETWORK_MESSAGE =
   /^(downloadable font: download failed .*status=2152398850|Firefox can’t establish a connection|The connection to ws)/;

@@ -134,8 +134,8 @@ export async function point(
 const INVITATION_DISTANCE_PX = 26;
 
 /**
- * Return the place of the hand that a first visit is invited to take. The invitation stands on the side of the hand that
- * is turned away from the performer, who is in the middle of the window.
+ * Return the place of the hand that a first visit is invited to take. The invitation stands on the side of the hand
+ * that is turned away from the performer, who is in the middle of the window.
  */
 export async function findHand(window: BrowserWindow): Promise<Point> {
   const hand = await waitFor(
@@ -178,8 +178,8 @@ export function waitForAnnouncement(window: BrowserWindow, part: string): Promis
 const REDUCTION = 6;
 
 /**
- * Return the share of the stage that differs between two screenshots. It is the middle of the window: half of its height
- * and a third of its width.
+ * Return the share of the stage that differs between two screenshots. It is the middle of the window: half of its
+ * height and a third of its width.
  */
 export function compareScreenshots(window: BrowserWindow, first: string, second: string): Promise<number> {
   return evaluate(

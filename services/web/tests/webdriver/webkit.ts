@@ -26,8 +26,8 @@ import {
 const ELEMENT_KEY = "element-6066-11e4-a52e-4f735466cecf";
 
 /**
- * Time limit of the start of a browser, in milliseconds, and how often it is tried. The driver chooses a port that is free,
- * and waits without end for the browser if another process takes the port before it does.
+ * Time limit of the start of a browser, in milliseconds, and how often it is tried. The driver chooses a port that is
+ * free, and waits without end for the browser if another process takes the port before it does.
  */
 const START_TIMEOUT_MS = 60_000;
 const START_ATTEMPTS = 3;

@@ -23,7 +23,9 @@ export function captureCommand(server: string, { session, needsToken }: CaptureT
   return parts.join(" ");
 }
 
-/** Create the section of the library. Its button shows the steps to what `captureTarget` returns then, or hides them. */
+/**
+ * Create the section of the library. Its button shows the steps to what `captureTarget` returns then, or hides them.
+ */
 export function createPerformerGuide(captureTarget: () => CaptureTarget): HTMLElement {
   const steps = element("div", { id: "performer-steps", hidden: true });
   const toggle = element(

@@ -1,4 +1,6 @@
-/** Connection panel. Its content is loaded when it is first opened; the samples that it shows are stored from the start. */
+/**
+ * Connection panel. Its content is loaded when it is first opened; the samples that it shows are stored from the start.
+ */
 import { translate } from "../../i18n/translator";
 import type { ViewerStatistics } from "../limb-state";
 import { createPanel, type Panel } from "../panel";

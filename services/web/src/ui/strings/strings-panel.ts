@@ -42,7 +42,9 @@ export interface StringsActions {
   nextDancer(): void;
   /** Report that a button for an input went down or came up. */
   press(input: DigitalInput, down: boolean): void;
-  /** Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded. */
+  /**
+   * Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded.
+   */
   useCamera(onChange: (isOn: boolean) => void): Promise<void>;
 }
 

@@ -15,7 +15,9 @@ function displayed(cost: number): number {
   return Math.ceil(cost * 60 - 1e-6) / 60;
 }
 
-/** Draw for `seconds` on a machine that needs `cost(level)` seconds a frame; return the levels in the order of change. */
+/**
+ * Draw for `seconds` on a machine that needs `cost(level)` seconds a frame; return the levels in the order of change.
+ */
 function drawFor(choice: AdaptiveQuality, seconds: number, cost: (level: number) => number): number[] {
   const levels: number[] = [];
   for (let passed = 0; passed < seconds; ) {
