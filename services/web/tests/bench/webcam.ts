@@ -8,12 +8,15 @@
  *   size. It includes detection, smoothing and the bounded acceleration of the hand. The motion is paused.
  * - `webcam_lag_ms_p95`: time from the camera's picture to the end of the first frame that shows its hands. It excludes
  *   the GPU process, as `pointer_ms_p95` of `make bench-page` does.
+ * - `webcam_body_deg_median`: angle between a bone of an arm or leg in the poses that a live performer sends, and the
+ *   person's in the same picture, of which the smoothing lags.
  */
 import { mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { setTimeout as delay } from "node:timers/promises";
 import { parseArgs } from "node:util";
+import type { Page } from "playwright-core";
 import { Vector3 } from "three";
 import { chromiumPath, launchChromium, PAGE_TIMEOUT_MS } from "../browser/chromium";
 import { evaluateInEngine } from "../browser/engine-probe";
@@ -23,7 +26,8 @@ import { type CameraView, FILM_FPS, fakeCamera, writeFilm } from "../webcam/film
 import { PERFORMANCE_S, performancePose } from "../webcam/performance";
 import { Person } from "../webcam/person";
 import { percentile, roundTo } from "./page/bench";
-import { type HandSample, recordFrames, recordPictures } from "./webcam/recording";
+import { bodyErrors } from "./webcam/body";
+import { type HandSample, recordFrames, recordPictures, recordSamples } from "./webcam/recording";
 
 const VIEWS: Readonly<Record<string, CameraView>> = {
   "2.0 m": { distance: 2, height: 1.2, fov: 46 },
@@ -31,7 +35,13 @@ const VIEWS: Readonly<Record<string, CameraView>> = {
 };
 /** Pictures of the same pose, so that the film is drawn sooner. */
 const REPETITIONS = 2;
-const BOUNDS: Readonly<Record<string, number>> = { webcam_hand_cm_median: 8, webcam_lag_ms_p95: 250 };
+/** The picture shows the feet. */
+const BODY_VIEW: CameraView = { distance: 3.2, height: 0.95, fov: 46 };
+const BOUNDS: Readonly<Record<string, number>> = {
+  webcam_hand_cm_median: 8,
+  webcam_lag_ms_p95: 250,
+  webcam_body_deg_median: 10,
+};
 
 const { values } = parseArgs({ options: { seconds: { type: "string", default: "45" } } });
 const seconds = Number(values.seconds);
@@ -62,12 +72,14 @@ function distance(a: readonly number[], b: readonly number[]): number {
   return Math.hypot(...a.map((value, axis) => value - b[axis]));
 }
 
-async function measure(url: string, path: string, times: readonly number[]): Promise<Measurement> {
+/** Open the page with the film as its camera, and switch the camera on. */
+async function withCamera<Result>(url: string, path: string, use: (page: Page) => Promise<Result>): Promise<Result> {
   const browser = await launchChromium(chromium as string, ...fakeCamera(path));
   try {
     const page = await browser.newPage({ viewport: { width: 760, height: 560 }, colorScheme: "dark" });
     page.setDefaultTimeout(PAGE_TIMEOUT_MS);
     await page.addInitScript(recordPictures);
+    await page.addInitScript(recordSamples);
     await page.goto(url);
     await waitForFirstPose(page);
     await waitForWelcome(page);
@@ -76,15 +88,29 @@ async function measure(url: string, path: string, times: readonly number[]): Pro
     await page.getByRole("button", { name: "Strings", exact: true }).click();
     await page.getByRole("button", { name: "Use my camera" }).click();
     await page.getByRole("button", { name: "Close strings" }).click();
-    await waitForHold(page, LEFT_HAND);
-    await evaluateInEngine(page, recordFrames);
-    await delay(seconds * 1000);
-    const shown = await evaluateInEngine(page, () => JSON.stringify(globalThis.shownHands));
-    const pictures = await page.evaluate(() => globalThis.webcamPictures);
-    return evaluate(JSON.parse(shown) as HandSample[], pictures, times);
+    return await use(page);
   } finally {
     await browser.close();
   }
+}
+
+async function measureHands(page: Page, times: readonly number[]): Promise<Measurement> {
+  await waitForHold(page, LEFT_HAND);
+  await evaluateInEngine(page, recordFrames);
+  await delay(seconds * 1000);
+  const shown = await evaluateInEngine(page, () => JSON.stringify(globalThis.shownHands));
+  const pictures = await page.evaluate(() => globalThis.webcamPictures);
+  return evaluate(JSON.parse(shown) as HandSample[], pictures, times);
+}
+
+async function measureBody(page: Page, times: readonly number[]): Promise<number[]> {
+  const card = page.getByRole("region", { name: "Camera" });
+  await card.getByText("Whole body").click();
+  await card.getByText(/^You are live on the stage/).waitFor();
+  await delay(seconds * 1000);
+  const samples = await page.evaluate(() => globalThis.bodySamples);
+  const pictures = await page.evaluate(() => globalThis.webcamPictures);
+  return bodyErrors(samples, pictures, times);
 }
 
 function evaluate(
@@ -137,16 +163,16 @@ function evaluate(
 
 const folder = mkdtempSync(join(tmpdir(), "bunraku-webcam-"));
 const server = await startServer({ demo: true });
-const all = { drawn: [] as number[], lags: [] as number[] };
+const all = { drawn: [] as number[], lags: [] as number[], body: [] as number[] };
+const path = join(folder, "film.y4m");
+const times = Array.from(
+  { length: Math.floor(PERFORMANCE_S * FILM_FPS) },
+  (_, picture) => (picture - (picture % REPETITIONS)) / FILM_FPS,
+);
 try {
   for (const [name, view] of Object.entries(VIEWS)) {
-    const path = join(folder, "film.y4m");
-    const times = Array.from(
-      { length: Math.floor(PERFORMANCE_S * FILM_FPS) },
-      (_, picture) => (picture - (picture % REPETITIONS)) / FILM_FPS,
-    );
     writeFilm(path, { times, view });
-    const result = await measure(server.url, path, times);
+    const result = await withCamera(server.url, path, (page) => measureHands(page, times));
     all.drawn.push(...result.drawn);
     all.lags.push(...result.lags);
     const cm = (distances: readonly number[], percent: number) => roundTo(percentile(distances, percent) * 100);
@@ -166,6 +192,12 @@ try {
       `${name}: lag, ms            p50 ${roundTo(percentile(result.lags, 50))}, p95 ${roundTo(percentile(result.lags, 95))}; detection p50 ${roundTo(percentile(result.detectionTimes, 50))}, p95 ${roundTo(percentile(result.detectionTimes, 95))}; ${roundTo(result.picturesPerSecond)} pictures/s`,
     );
   }
+  writeFilm(path, { times, view: BODY_VIEW });
+  all.body.push(...(await withCamera(server.url, path, (page) => measureBody(page, times))));
+  const degrees = (percent: number) => roundTo(percentile(all.body, percent));
+  console.log(
+    `${BODY_VIEW.distance} m: bones of the body, degrees  p50 ${degrees(50)}, p75 ${degrees(75)}, p95 ${degrees(95)}`,
+  );
 } finally {
   await server.stop();
   rmSync(folder, { recursive: true, force: true });
@@ -173,6 +205,7 @@ try {
 const figures = {
   webcam_hand_cm_median: roundTo(percentile(all.drawn, 50) * 100),
   webcam_lag_ms_p95: roundTo(percentile(all.lags, 95)),
+  webcam_body_deg_median: roundTo(percentile(all.body, 50)),
 };
 for (const [name, value] of Object.entries(figures))
   console.log(

@@ -21,9 +21,18 @@ export interface HandSample {
   readonly hands: { readonly left: number[]; readonly right: number[] };
 }
 
+/** Pose that the page has sent as a live performer. */
+export interface BodySample {
+  /** In milliseconds since the epoch. */
+  readonly sampledAt: number;
+  /** The message. */
+  readonly bytes: number[];
+}
+
 declare global {
   /** In the page's realm. */
   var webcamPictures: PictureSample[];
+  var bodySamples: BodySample[];
   /** In the engine's realm. */
   var shownHands: HandSample[];
 }
@@ -65,6 +74,21 @@ export function recordPictures(): void {
     }
     post.call(this, message, transfer);
   } as Worker["postMessage"];
+}
+
+/** Record the poses that the page sends as a live performer. Runs in the page before its scripts. */
+export function recordSamples(): void {
+  const sampleType = 72;
+  const samples: BodySample[] = [];
+  globalThis.bodySamples = samples;
+  const send = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (data) {
+    if (data instanceof Uint8Array && data[0] === sampleType) {
+      const microseconds = new DataView(data.buffer, data.byteOffset).getBigUint64(8, true);
+      samples.push({ sampledAt: Number(microseconds) / 1000, bytes: [...data] });
+    }
+    send.call(this, data);
+  };
 }
 
 /** Record which hands each frame shows. Runs in the engine. */
