@@ -107,9 +107,11 @@ class MonitoredViewer(Viewer):
 class MonitoredPuppeteer:
     """Puppeteer that moves the left hand in circles at 30 Hz and reconnects whenever the connection is lost."""
 
-    def __init__(self, client: Client, session: str) -> None:
+    def __init__(self, client: Client, session: str, sent_inputs: int = 0) -> None:
         self._client, self._session = client, session
-        self.connections = self.sent_inputs = 0
+        self.connections = 0
+        self.sent_inputs = sent_inputs
+        """Inputs sent, also by the puppeteers before this one."""
         self.errors: list[tuple[float, str]] = []
         """When connections were lost, and why."""
         self._task = asyncio.create_task(self._run(), name="puppeteer")

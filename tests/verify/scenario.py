@@ -165,11 +165,13 @@ async def _spread_viewers(scenario: Scenario, address: str) -> None:
 async def connect_through_other_replica(scenario: Scenario) -> None:
     """Connect the puppeteer through a session replica that does not own the session."""
     owner = await scenario.find_owner_replica()
+    sent_inputs = 0
     for _ in range(20):
         if hasattr(scenario, "puppeteer"):
             await scenario.puppeteer.stop()
+            sent_inputs = scenario.puppeteer.sent_inputs
         before = await scenario.stack.count_connections("session")
-        scenario.puppeteer = MonitoredPuppeteer(scenario.client, scenario.session)
+        scenario.puppeteer = MonitoredPuppeteer(scenario.client, scenario.session, sent_inputs)
         async with asyncio.timeout(30):
             while not scenario.puppeteer.connections:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
