@@ -28,10 +28,10 @@ from tests.bench.live_stage import CAPTURE_FPS, Source, place_points, run_server
 from tests.capture.capture_process import run_capture
 from tests.e2e.held_performer import (
     FrameRecorder,
-    are_as_smooth,
     check_archive,
     check_free_limbs,
     check_held_limbs,
+    check_smoothness,
     target_at,
 )
 from tests.e2e.test_capture_stream import read_stage, stop
@@ -45,7 +45,7 @@ SERVER_PORT = 18080
 SETTLE_FRAMES, FRAMES = 240, 600
 """Frames at 60 Hz until delays have settled, and those that are compared."""
 MAX_WINDOWS = 5
-"""Most times that `FRAMES` are recorded: on a busy machine processes are suspended, and poses jump without losses."""
+"""Most times that `FRAMES` are recorded: on a busy machine friends lose limbs, and poses jump without losses."""
 FRIENDS = (Limb.LEFT_HAND, Limb.LEFT_LEG), (Limb.RIGHT_HAND,)
 """Limbs of each friend."""
 
@@ -121,6 +121,7 @@ def test_performer_on_a_lossy_link_is_held_by_friends(
 
 async def check_performance(machines: Machines, url: str, folder: Path) -> None:
     clip, take = folder / "clip.bvh", folder / "take.bvh"
+    source = Source(clip)
     address, capture = f"http://{machines.venue_address}:{SERVER_PORT}", ("vmc", "--host", "0.0.0.0", "--json")
     async with asyncio.timeout(COROUTINE_TIMEOUT_S), AsyncExitStack() as stack:
         client = await stack.enter_async_context(Client(url))
@@ -145,19 +146,21 @@ async def check_performance(machines: Machines, url: str, folder: Path) -> None:
             while len(viewer.performers) < 2:  # noqa: ASYNC110
                 await asyncio.sleep(0.05)
             await recorder.record_next(SETTLE_FRAMES)
-            for _ in range(MAX_WINDOWS):
+            for window in range(MAX_WINDOWS):
                 shown, clean_shown = await recorder.record_next(FRAMES)
-                figures = [track.figure for track in viewer.performers if track is not None]
-                if are_as_smooth(place_points(figures[0], shown), place_points(figures[1], clean_shown)):
+                times_us = np.array([*recorder.frames]) - viewer.clock.slewed_offset
+                figure, clean_figure = [track.figure for track in viewer.performers if track is not None]
+                try:
+                    check_smoothness(place_points(figure, shown), place_points(clean_figure, clean_shown))
+                    check_held_limbs(figure, shown, times_us)
+                    check_free_limbs(source, begin_us, figure, shown, times_us)
                     break
-            else:
-                pytest.fail("losses make the performer jump")
-            times_us = np.array([*recorder.frames]) - viewer.clock.slewed_offset
+                except AssertionError:
+                    if window == MAX_WINDOWS - 1:
+                        raise
             await check_presence(viewer, friends)
             for task in holding:
                 task.cancel()
-        check_held_limbs(figures[0], shown, times_us)
-        check_free_limbs(Source(clip), begin_us, figures[0], shown, times_us)
         statistics = await stop(lossy, signal.SIGTERM)
         # the link was as bad as it should be
         assert statistics["missing"] > 0  # type: ignore[operator]
