@@ -1,7 +1,7 @@
 """Capture tool of `live.py`: sends a clip as VMC bundles in real time, forth and back, until its input ends.
 
-`python -m tests.bench.live_sender CLIP PORT FPS FAULTY`: prints the time of `time.monotonic` of the first frame in
-microseconds. With FAULTY 1 the network loses, repeats, delays and reorders, and the sender's clock is 200 ppm fast.
+`python -m tests.bench.live_sender CLIP PORT FPS FAULTY [HOST]`: prints the time of `time.monotonic` of the first frame
+in microseconds. With FAULTY 1 the network loses, repeats, delays and reorders, and the sender's clock is 200 ppm fast.
 """
 
 from __future__ import annotations
@@ -41,18 +41,20 @@ def add_time(bundle: bytes, seconds: float) -> bytes:
     return bundle + struct.pack(">i", len(message)) + message
 
 
-def send(bundles: list[bytes], arrivals: list[Arrival], begin_s: float, port: int, ended: threading.Event) -> None:
+def send(
+    bundles: list[bytes], arrivals: list[Arrival], begin_s: float, address: tuple[str, int], ended: threading.Event
+) -> None:
     """Send the frames at the times of their arrivals, which the network has delayed already."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for arrival in arrivals:
             if ended.wait(max(begin_s + arrival.arrival_s - time.monotonic(), 0.0)):
                 return
             packet = add_time(bundles[bounce(arrival.number, len(bundles))], arrival.sender_s)
-            sender.sendto(packet, ("127.0.0.1", port))
+            sender.sendto(packet, address)
 
 
 def main() -> None:
-    clip, port, fps, faulty = sys.argv[1:]
+    clip, port, fps, faulty, *hosts = sys.argv[1:]
     bundles = make_bundles(Path(clip), float(fps))
     faults = Faults(reordering_s=0.05, offset_s=12.5) if int(faulty) else CLEAN
     arrivals = simulate_arrivals(round(MAX_SECONDS * float(fps)), float(fps), faults, 1)
@@ -65,7 +67,7 @@ def main() -> None:
         ended.set()
 
     threading.Thread(target=wait_for_end, daemon=True).start()
-    send(bundles, arrivals, begin_s, int(port), ended)
+    send(bundles, arrivals, begin_s, (hosts[0] if hosts else "127.0.0.1", int(port)), ended)
 
 
 if __name__ == "__main__":

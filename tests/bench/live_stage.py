@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
 import os
 import re
@@ -32,6 +33,7 @@ from bunraku.wire.live import Live
 from bunraku.wire.messages import unpack
 from tests.bench.live_sender import add_time, bounce, make_bundles
 from tests.processes import free_port
+from tests.time_limit import HANG_TIMEOUT_S
 
 BUNRAKU = Path(sys.executable).parent / "bunraku"
 CAPTURE_FPS = 60.0
@@ -54,19 +56,18 @@ class Server(NamedTuple):
 @contextmanager
 def run_server_process(folder: Path, *options: str) -> Iterator[Server]:
     """Run `bunraku up` in a process."""
-    process = subprocess.Popen(
-        [BUNRAKU, "up", "--data", folder, *(options or ("--port", "0"))],
-        stdout=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "NO_COLOR": "1", "COLUMNS": "200"},
-    )
-    assert process.stdout is not None
-    try:
-        url = next(found[1] for line in process.stdout if (found := re.search(r"is at (http://\S+)/", line)))
-        yield Server(url, process.pid)
-    finally:
-        process.terminate()
-        process.wait(20)
+    command = [str(BUNRAKU), "up", "--data", str(folder), *(options or ("--port", "0"))]
+    environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200"}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as process:
+        assert process.stdout is not None
+        try:
+            url = next(found[1] for line in process.stdout if (found := re.search(r"is at (http://\S+)/", line)))
+            yield Server(url, process.pid)
+        finally:
+            process.terminate()
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(HANG_TIMEOUT_S)
+            process.kill()
 
 
 class Source:

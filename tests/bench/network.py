@@ -8,16 +8,12 @@ bitrate and delay of a link. Several links run side by side, each to a separate 
 
 from __future__ import annotations
 
-import ctypes
 import importlib.util
 import multiprocessing
 import os
 import select
-import shutil
 import socket
 import subprocess
-import sys
-import threading
 import time
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
@@ -26,9 +22,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from tests import namespaces
+from tests.namespaces import command_in, in_namespace, open_namespace, run_ip
+
 REPOSITORY = Path(__file__).resolve().parents[2]
-_NEW_NETWORK = 0x40000000
-_LIBC = ctypes.CDLL(None, use_errno=True)
 
 
 def narrowlink_path() -> Path:
@@ -40,10 +37,8 @@ def missing_requirement() -> str | None:
     """Return why links cannot be emulated here, None if they can."""
     if not narrowlink_path().is_file():
         return f"there is no {narrowlink_path()}; set BUNRAKU_SHARED to the folder of shared material"
-    if sys.platform != "linux" or os.geteuid() != 0:
-        return "network namespaces need Linux and root"
-    if shutil.which("ip") is None:
-        return "there is no `ip`: install iproute2"
+    if (reason := namespaces.missing_requirement()) is not None:
+        return reason
     if not Path("/dev/net/tun").exists():
         return "there is no /dev/net/tun"
     return None
@@ -78,7 +73,7 @@ class FarEnd:
 
     def open_socket(self) -> socket.socket:
         """Open an unconnected TCP socket at the far end; the calling thread stays in its namespace."""
-        with _in_namespace(self.namespace):
+        with in_namespace(self.namespace):
             opened = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         opened.setblocking(False)
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -100,7 +95,7 @@ class EmulatedNetwork:
 
     def run(self, command: Sequence[str], **options: Any) -> subprocess.Popen[str]:
         """Start a process at the near end; `options` are those of `subprocess.Popen`."""
-        return subprocess.Popen(["ip", "netns", "exec", self.near_namespace, *command], text=True, **options)
+        return subprocess.Popen([*command_in(self.near_namespace), *command], text=True, **options)
 
     @contextmanager
     def open_links(self, links: Sequence[EmulatedLink]) -> Iterator[list[FarEnd]]:
@@ -120,15 +115,15 @@ class EmulatedNetwork:
                 )
                 names = [f"bn{os.getpid() % 100_000}x{number}{end}" for end in "ab"]
                 devices.append((module.tun(names[0]), module.tun(names[1])))
-                _run_ip(f"netns add {far}")
+                run_ip(f"netns add {far}")
                 self._namespaces.append(far)
                 for namespace, name, host, peer in (
                     (self.near_namespace, names[0], near_host, far_host),
                     (far, names[1], far_host, near_host),
                 ):
-                    _run_ip(f"link set {name} netns {namespace}")
-                    _run_ip(f"-n {namespace} addr add {host} peer {peer} dev {name}")
-                    _run_ip(f"-n {namespace} link set {name} up mtu 1500 txqueuelen 1000")
+                    run_ip(f"link set {name} netns {namespace}")
+                    run_ip(f"-n {namespace} addr add {host} peer {peer} dev {name}")
+                    run_ip(f"-n {namespace} link set {name} up mtu 1500 txqueuelen 1000")
                 fars.append(FarEnd(far, near_host, link, names[1]))
                 fars[-1].byte_counters = _Counter(counters, 2 * nth)
             pump = multiprocessing.get_context("fork").Process(
@@ -167,39 +162,12 @@ class _Counter:
 def open_network() -> Iterator[EmulatedNetwork]:
     """Create a near end; this thread, and all it starts, runs in it until the end of the block."""
     name = f"bunraku{os.getpid()}"
-    _run_ip(f"netns add {name}")
-    try:
-        _run_ip(f"-n {name} link set lo up")
-        with _in_namespace(name):
-            yield EmulatedNetwork(name)
-    finally:
-        _run_ip(f"netns del {name}")
+    with open_namespace(name), in_namespace(name):
+        yield EmulatedNetwork(name)
 
 
 def _host_address(number: int, end: int) -> str:
     return f"10.{99 + number // 250}.{number % 250}.{end}"
-
-
-def _run_ip(arguments: str) -> None:
-    subprocess.run(["ip", *arguments.split()], check=True)
-
-
-@contextmanager
-def _in_namespace(namespace: str) -> Iterator[None]:
-    own_namespace = os.open(f"/proc/self/task/{threading.get_native_id()}/ns/net", os.O_RDONLY)
-    target_namespace = os.open(f"/run/netns/{namespace}", os.O_RDONLY)
-    try:
-        _enter_namespace(target_namespace)
-        yield
-    finally:
-        _enter_namespace(own_namespace)
-        os.close(own_namespace)
-        os.close(target_namespace)
-
-
-def _enter_namespace(fd: int) -> None:
-    if _LIBC.setns(fd, _NEW_NETWORK) != 0:
-        raise OSError(ctypes.get_errno(), "the network namespace cannot be entered")
 
 
 def _load_narrowlink() -> Any:

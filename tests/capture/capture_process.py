@@ -6,7 +6,7 @@ import asyncio
 import socket
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -26,9 +26,10 @@ def make_packet(number: int) -> bytes:
 
 
 @asynccontextmanager
-async def run_capture(*arguments: str) -> AsyncIterator[asyncio.subprocess.Process]:
-    """Run `bunraku capture`, from the moment at which it listens, and end it."""
+async def run_capture(*arguments: str, prefix: Sequence[str] = ()) -> AsyncIterator[asyncio.subprocess.Process]:
+    """Run `bunraku capture`, from the moment at which it listens, and end it; the command follows `prefix`."""
     process = await asyncio.create_subprocess_exec(
+        *prefix,
         BUNRAKU,
         "capture",
         *arguments,
@@ -40,7 +41,7 @@ async def run_capture(*arguments: str) -> AsyncIterator[asyncio.subprocess.Proce
         assert process.stderr is not None
         async with asyncio.timeout(HANG_TIMEOUT_S):
             assert b"Listening for VMC" in await process.stderr.readline()
-            yield process
+        yield process
     finally:
         if process.returncode is None:
             process.kill()

@@ -1,5 +1,7 @@
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.live import TARGET_ERROR_MM, LiveEncoder, LiveTrack
@@ -7,6 +9,11 @@ from bunraku.codec.motion_track import plan_motion_track
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, Motion, joint_and_tip_positions, standard_figure
+from bunraku.playout.performance import sample_pose
+from bunraku.wire.live import MAX_LIVE_BLOCK_BYTES, MAX_ROOT_M, Sample
+
+REST = Motion(standard_figure(), 60.0, np.array([[0.0, 0.9, 0.0]]), np.tile(rotation.IDENTITY, (1, JOINT_COUNT, 1)))
+SKELETON = plan_motion_track(REST).skeleton
 
 
 def make_motion(frames: int = 240) -> Motion:
@@ -74,3 +81,24 @@ def test_damaged_block_is_rejected_or_decoded() -> None:
         except DamagedBlock:
             rejected += 1
     assert rejected > 0
+
+
+coordinates = st.floats(-MAX_ROOT_M, MAX_ROOT_M, width=32)
+turns = st.binary(min_size=6 * JOINT_COUNT, max_size=6 * JOINT_COUNT) | st.sampled_from([b"\xff\x7f", b"\0\x80"])
+samples = st.builds(
+    lambda root, data: Sample(0, 0, root, tuple(np.resize(np.frombuffer(data, "<i2"), 3 * JOINT_COUNT).tolist())),
+    st.tuples(coordinates, coordinates, coordinates),
+    turns,
+)
+
+
+@given(st.lists(samples, min_size=2, max_size=2))
+def test_poses_of_any_samples_fit_a_message(pair: list[Sample]) -> None:
+    roots, rotations = zip(*map(sample_pose, pair), strict=True)
+    encoder = LiveEncoder(SKELETON)
+    encoded = encoder.encode(np.array(roots), np.array(rotations))
+    assert len(encoded.data) <= MAX_LIVE_BLOCK_BYTES
+    assert np.isfinite(encoded.mean_error_mm)
+    root, shown = encoder.live_track.decode(2, encoded.data).pose_at(np.arange(2.0))
+    assert np.isfinite(root).all()
+    assert np.linalg.norm(shown, axis=-1) == pytest.approx(1.0)

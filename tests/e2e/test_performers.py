@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 from pathlib import Path
+from typing import Any
 
 import httpx2
 import numpy as np
@@ -23,8 +24,10 @@ from tests.time_limit import HANG_TIMEOUT_S
 LEFT_TIP, RIGHT_TIP = 19, 20
 
 
-async def load_performer(http: httpx2.AsyncClient, motion: str, performer: int) -> tuple[MotionBlockStore, Placement]:
-    """Return the blocks of a performer at its highest bitrate level, and its placement."""
+async def load_blocks(
+    http: httpx2.AsyncClient, motion: str, performer: int = 0
+) -> tuple[MotionBlockStore, dict[str, Any]]:
+    """Return the blocks of a performer at its highest bitrate level, and the description of its track."""
     description = unpack((await http.get(f"/v1/motions/{motion}/description")).content)
     assert isinstance(description, Description)
     track_description = description.tracks[performer]
@@ -32,6 +35,12 @@ async def load_performer(http: httpx2.AsyncClient, motion: str, performer: int) 
     for index in range(store.track.block_count):
         response = await http.get(f"/v1/motions/{motion}/blocks/{rate}/{index}?track={performer}")
         store.put(index, rate, decode_motion_block(store.track, Data.unpack(response.content).block))
+    return store, track_description
+
+
+async def load_performer(http: httpx2.AsyncClient, motion: str, performer: int) -> tuple[MotionBlockStore, Placement]:
+    """Return the blocks of a performer at its highest bitrate level, and its placement."""
+    store, track_description = await load_blocks(http, motion, performer)
     return store, Placement.parse(track_description["place"])
 
 

@@ -1,7 +1,7 @@
 """Coverage-guided fuzzing in a separate process: `python -m tests.fuzz GROUP CORPUS COUNTS [options of libFuzzer]`.
 
-GROUP is "contract", whose inputs select the target by their first byte, or the name of one target of live capture. The
-Python code of the packages is instrumented. Compiled code cannot be, but its bounds are checked if
+GROUP is "contract", whose inputs select the target by their first byte, or the name of one target of `capture_targets`.
+The Python code of the packages is instrumented. Compiled code cannot be, but its bounds are checked if
 NUMBA_BOUNDSCHECK=1. The file COUNTS holds an int64 for each target and outcome (rejected, accepted). A failure ends the
 process with its traceback on stdout and the bytes of the input on stderr.
 """
@@ -37,7 +37,15 @@ CAPTURE = [
     "bunraku.capture.osc_mapping",
     "bunraku.capture.osc_capture",
     "tomllib",
+    "bunraku.http.structured_body",
+    "bunraku.session.live.performer_connection",
+    "bunraku.session.live.sample_json",
+    "bunraku.websocket.connection",
+    "bunraku.websocket.frame",
+    "bunraku.wire.live",
+    "bunraku.wire.messages",
     "tests.fuzz.capture_targets",
+    "tests.fuzz.performer_input",
 ]
 
 

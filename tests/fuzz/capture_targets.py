@@ -1,14 +1,13 @@
-"""Fuzzing targets: the readers of live capture, and invariants of every frame.
+"""Fuzzing targets: the readers of live capture, and invariants of every frame; the input socket of a performer.
 
-The targets of protocols take a sequence of datagrams, each after its length in two bytes. A target returns True if it
-accepts a datagram or file and False if it rejects all with `UnreadableCapture`. Any other exception is a failure.
+The targets of protocols take a sequence of datagrams. A target returns True if it accepts a datagram or file and False
+if it rejects all with `UnreadableCapture`. Any other exception is a failure.
 """
 
 from __future__ import annotations
 
 import json
-import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from math import isfinite, sqrt
 
 import lz4.frame
@@ -21,10 +20,12 @@ from bunraku.capture.osc_mapping import parse_mapping
 from bunraku.capture.rokoko import RokokoAssembler
 from bunraku.capture.vmc import VmcAssembler
 from tests.capture.vmc_performer import make_bundle, make_message
+from tests.fuzz import performer_input as input_socket
+from tests.fuzz.datagram_sequence import join_datagrams, split_datagrams
+from tests.fuzz.performer_input import performer_input
 
 MAX_FRAMES_PER_BYTE = 1 / 8
 """Bound of frames by the size of their datagrams: the shortest message has eight bytes."""
-LENGTH = struct.Struct(">H")
 TURN = (0.0, 0.0, 0.0, 1.0)
 
 MAPPING = {
@@ -50,21 +51,6 @@ PACKET = make_bundle(
     ]
 )
 """Messages for `MAPPING`, and for whatever a fuzzed mapping makes of them."""
-
-
-def split_datagrams(data: bytes) -> Iterator[bytes]:
-    """Yield the datagrams of an input."""
-    position = 0
-    while position + LENGTH.size <= len(data):
-        (size,) = LENGTH.unpack_from(data, position)
-        position += LENGTH.size
-        yield data[position : position + size]
-        position += size
-
-
-def join_datagrams(*datagrams: bytes) -> bytes:
-    """Return the input for a sequence of datagrams."""
-    return b"".join(LENGTH.pack(len(datagram)) + datagram for datagram in datagrams)
 
 
 def check_frame(frame: CapturedFrame, assembler: FrameAssembler) -> None:
@@ -128,7 +114,7 @@ def osc_mapping(data: bytes) -> bool:
     return True
 
 
-TARGETS: tuple[Callable[[bytes], bool], ...] = (vmc, mvn, rokoko, mapped_osc, osc_mapping)
+TARGETS: tuple[Callable[[bytes], bool], ...] = (vmc, mvn, rokoko, mapped_osc, osc_mapping, performer_input)
 
 DICTIONARY: tuple[str, ...] = (
     *("/VMC/Ext/Bone/Pos", "/VMC/Ext/Root/Pos", "/VMC/Ext/Blend/Val", "/VMC/Ext/Blend/Apply", "/VMC/Ext/OK"),
@@ -136,6 +122,18 @@ DICTIONARY: tuple[str, ...] = (
     *('"version"', '"scene"', '"actors"', '"body"', '"hip"', '"position"', '"rotation"', '"face"', "1e999", "NaN"),
     *("[[map]]", "version = 1", 'space = "world"', "address", "kind", "names", "order", "unit", "axes", '"zxy"'),
     *("first_argument", "joint", "{joint}", '"rotation"', '"blendshape"', '"time"', '"frame_end"', '"degrees"'),
+    *(
+        '"root"',
+        '"rotations"',
+        '"time"',
+        '"l_shoulder"',
+        '"skullbase"',
+        ":[0,0,0]",
+        ":[1,0,0,0]",
+        "[0,0,0,0]",
+        "-0",
+        "1e-9",
+    ),
 )
 """Words that libFuzzer inserts."""
 
@@ -168,4 +166,5 @@ def load_seeds() -> list[tuple[int, bytes]]:
         (3, join_datagrams(PACKET, PACKET)),
         (4, toml),
         (4, json.dumps(MAPPING).encode()),
+        *((5, data) for data in input_socket.load_seeds()),
     ]

@@ -1,4 +1,4 @@
-"""Fuzzing of the readers of live capture: one error type, bounded results, no other error.
+"""Fuzzing of the readers of live capture and of the input socket of performers: one error type, bounded results.
 
 BUNRAKU_FUZZ_RUNS sets the number of coverage-guided inputs of each target.
 """
@@ -20,8 +20,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.fuzz.capture_targets import DICTIONARY, LENGTH, TARGETS, join_datagrams, load_seeds
+from tests.fuzz.capture_targets import DICTIONARY, TARGETS, load_seeds
 from tests.fuzz.corruption import hostile_inputs
+from tests.fuzz.datagram_sequence import LENGTH, join_datagrams
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = 500
