@@ -5,7 +5,8 @@ import type { Plugin, Rolldown } from "vite";
 const MAIN = "/src/main.ts";
 /** First module of the page, and modules that it loads later and that use some of the engine's. */
 const PAGE = "src/app/start.ts";
-const LATER = ["src/audio/sound.ts", "src/ui/mapping/mapping-dialog.ts"];
+const APP = "src/app/app.ts";
+const LATER = [APP, "src/audio/sound.ts", "src/ui/mapping/mapping-dialog.ts"];
 /** Modules that the worker loads: the engine, and the renderer. */
 const ENGINE = "src/engine/worker.ts";
 const STAGE = "src/engine/stage-chunk.ts";
@@ -18,6 +19,7 @@ export const startupChunks: Rolldown.CodeSplittingGroup[] = [
   { name: "main", test: endsWith(MAIN), priority: 4 },
   { name: nameShared, debugName: "shared", priority: 3 },
   { name: "start", test: endsWith(`/${PAGE}`), priority: 2 },
+  { name: "app", test: endsWith(`/${APP}`), priority: 1 },
   { name: "engine", test: endsWith(ENGINE), priority: 2 },
   { name: "stage-chunk", test: endsWith(STAGE), priority: 1 },
 ];
@@ -28,6 +30,8 @@ function endsWith(path: string): (id: string) => boolean {
 
 /** Return the name of the chunk that the page and its worker share if the module belongs there. */
 function nameShared(id: string, context: Rolldown.ChunkingContext): string | null {
+  // The bundler's own helpers, in place of a chunk of a few bytes.
+  if (id.endsWith("rolldown/runtime.js")) return "shared";
   const importers = new Set([id]);
   // The iteration also visits what is added meanwhile.
   for (const importer of importers)

@@ -105,6 +105,7 @@ export class Engine {
       this.send({ type: "unavailable", reason: "not loaded" });
       return;
     }
+    this.send({ type: "loaded" });
     // Handle messages that arrived meanwhile first: the requests they lead to are sent before the stage is built.
     await new Promise((resolve) => setTimeout(resolve));
     if (this.#isClosed) return;
