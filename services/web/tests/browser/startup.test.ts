@@ -70,7 +70,11 @@ describeInBrowser("startup", { server: "open" }, (fixture) => {
       },
     });
     await page.getByRole("button", { name: "Library" }).waitFor();
-    const allowed = [/^\/$/, /^\/v1\/sessions$/, /\/(main|start|rolldown-runtime|shared|engine|stage-chunk)-.*\.js$/];
+    const allowed = [
+      /^\/$/,
+      /^\/v1\/sessions$/,
+      /\/(main|start|rolldown-runtime|shared|engine|mesh|stage-chunk)-.*\.js$/,
+    ];
     const paths = [...new Set(requestsOfStage)];
     expect(paths.filter((path) => !allowed.some((pattern) => pattern.test(path)))).toEqual([]);
     expect(paths.length).toBeGreaterThan(4);
@@ -96,7 +100,7 @@ describeInBrowser("startup", { server: "open" }, (fixture) => {
     );
     const initial = [...scripts].filter((path) => !DEFERRED_FILES.some((pattern) => pattern.test(path)));
     expect(initial.sort()).toEqual(linked.sort());
-    expect(linked.length).toBeLessThanOrEqual(6);
+    expect(linked.length).toBeLessThanOrEqual(7);
     const sizes = await Promise.all(
       ["/", ...initial].map(async (path) => {
         const response = await fetch(new URL(path, fixture.url));
