@@ -101,6 +101,9 @@ describeInBrowser("startup", { server: "open" }, (fixture) => {
     const initial = [...scripts].filter((path) => !DEFERRED_FILES.some((pattern) => pattern.test(path)));
     expect(initial.sort()).toEqual(linked.sort());
     expect(linked.length).toBeLessThanOrEqual(7);
+    // The mesh is built before the renderer has loaded.
+    const mesh = await fetch(new URL(linked.find((path) => path.includes("/mesh-")) as string, fixture.url));
+    expect(await mesh.text()).not.toContain("stage-chunk-");
     const sizes = await Promise.all(
       ["/", ...initial].map(async (path) => {
         const response = await fetch(new URL(path, fixture.url));
