@@ -45,9 +45,9 @@ PORTS = 39539, 39540
 SERVER_PORT = 18080
 SETTLE_MESSAGES = 120
 """Live messages, 30 per second, until delays have settled."""
-FRAMES = 600
+FRAMES = 300
 """Frames at 60 Hz that are compared."""
-MAX_WINDOWS = 5
+MAX_WINDOWS = 20
 """Most times that `FRAMES` are recorded: on a busy machine friends lose limbs, and poses jump without losses."""
 FRIENDS = (Limb.LEFT_HAND, Limb.LEFT_LEG), (Limb.RIGHT_HAND,)
 """Limbs of each friend."""
