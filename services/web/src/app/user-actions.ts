@@ -145,13 +145,13 @@ function webcamStage(app: AppParts): WebcamStage {
   };
 }
 
-function keptMotionActions({ page, playback }: AppParts): KeptMotionActions {
+function keptMotionActions(app: AppParts): KeptMotionActions {
   return {
-    toast: (message, ...actions) => page.toast(message, ...actions),
-    play: (motion) => void playback.playMotion(motion),
+    toast: (message, ...actions) => app.page.toast(message, ...actions),
+    play: (motion) => void app.playback.playMotion(motion),
     showDownloads: (motion) => {
-      page.panels.open("library");
-      page.library.showDownloads(motion);
+      app.page.panels.open("library");
+      app.page.library.showDownloads(motion);
     },
   };
 }
