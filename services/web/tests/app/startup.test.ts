@@ -9,7 +9,7 @@ function createStartup(): { startup: StartupSequence; calls: string[]; state: ()
   const startup = new StartupSequence(root);
   const calls: string[] = [];
   startup.runWhenFinished(() => void calls.push("sound"));
-  void startup.buildDue.then(() => startup.onPageBuilt());
+  void startup.pageDue.then(() => startup.onPageBuilt());
   return { startup, calls, state: () => root.dataset["arriving"] };
 }
 
@@ -51,33 +51,20 @@ test("callbacks run at once after the first frame", () => {
   expect(calls).toEqual(["sound", "later"]);
 });
 
-function watch(due: Promise<void>): () => boolean {
+function watchPageDue(startup: StartupSequence): () => boolean {
   let isDue = false;
-  void due.then(() => (isDue = true));
+  void startup.pageDue.then(() => (isDue = true));
   return () => isDue;
 }
 
 test("page loads once the scripts of the stage have, or after a timeout", async () => {
   for (const isLoaded of [true, false]) {
     const { startup } = createStartup();
-    const isDue = watch(startup.loadDue);
+    const isDue = watchPageDue(startup);
     await vi.advanceTimersByTimeAsync(1_999);
     expect(isDue()).toBe(false);
     if (isLoaded) startup.loadPage();
     await vi.advanceTimersByTimeAsync(isLoaded ? 0 : 1);
-    expect(isDue()).toBe(true);
-  }
-});
-
-test("page is built after the first frame, or once that is late", async () => {
-  for (const isDrawn of [true, false]) {
-    const { startup } = createStartup();
-    const isDue = watch(startup.buildDue);
-    startup.loadPage();
-    await vi.advanceTimersByTimeAsync(2_499);
-    expect(isDue()).toBe(false);
-    if (isDrawn) startup.finish();
-    await vi.advanceTimersByTimeAsync(isDrawn ? 0 : 1);
     expect(isDue()).toBe(true);
   }
 });
