@@ -1,16 +1,17 @@
-/** Composition of the page around the stage: session, inputs, sound and user interface. */
+/** Composition of the page: session, stage, inputs, sound and user interface. */
 import { browserSoundPreference } from "../audio/preference";
 import { pageAccess } from "../client/access";
-import type { EngineCommand } from "../engine/message";
-import { translate } from "../i18n/translator";
+import type { EngineCommand, StageView } from "../engine/message";
+import { pageLanguage, translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { loadMapping, saveMapping } from "../input/mapping-store";
 import { FileStore } from "../storage/file-store";
 import { browserStorage } from "../storage/web-storage";
+import { resolveDisplayName } from "../ui/display-name";
 import { createPage, type Page } from "../ui/page";
 import { createTheme, type ThemeChoice } from "../ui/theme";
 import { AvatarSlots } from "./avatar-slot";
-import type { EarlyStage } from "./early-stage";
+import { EngineConnection } from "./engine-connection";
 import { Exporter } from "./exporter";
 import { Invitation } from "./invitation";
 import { LibraryController } from "./library-controller";
@@ -34,20 +35,27 @@ export class App implements AppParts {
   readonly theme: ThemeChoice;
   #mapping: Mapping = loadMapping();
 
-  /** `isAlone` is true if the stage is shown without controls. */
-  constructor(
-    canvas: HTMLCanvasElement,
-    startup: StartupSequence,
-    private readonly early: EarlyStage,
-    isAlone: boolean,
-  ) {
-    const { engine, reducedMotion } = early;
+  /** `view` is the view without controls; null for the page with its controls. */
+  constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence, view: StageView | null) {
+    const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
     canvas.ariaLabel = translate(
       "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.",
     );
-    this.displayName = early.displayName;
+    this.displayName = resolveDisplayName(query, Math.random());
     this.page = createPage(document.body, createUserActions(this));
     const { page } = this;
+    const engine = new EngineConnection(
+      canvas,
+      {
+        server: location.origin,
+        token: pageAccess.token,
+        language: pageLanguage(),
+        timeOrigin: performance.timeOrigin,
+        bestQuality: query.get("quality") === "best",
+        view,
+      },
+      (event) => this.stageHost.onEvent(event),
+    );
     const send = (command: EngineCommand) => engine.post(command);
     this.limbs = new LimbControls(send, createKeyActions(this));
     this.exporter = new Exporter(page, () => this.stageHost.takePicture());
@@ -69,7 +77,7 @@ export class App implements AppParts {
       invitation: new Invitation(page.nameTags),
       getAvatarFiles: () => this.avatarSlots.activeFiles,
       viewOnly: !pageAccess.allows("control"),
-      isAlone,
+      isAlone: view !== null,
       getMapping: () => this.#mapping,
     });
     this.avatarSlots = new AvatarSlots(
@@ -80,7 +88,8 @@ export class App implements AppParts {
       page,
       startup,
       reducedMotion,
-      early,
+      query,
+      displayName: this.displayName,
       library: this.library,
       soundController: this.soundController,
       avatarSlots: this.avatarSlots,
@@ -93,13 +102,12 @@ export class App implements AppParts {
     });
   }
 
-  /** Take over the stage. */
-  start(): void {
+  /** Enter the session and start the engine, in `worker` if there is one, both at the same time. */
+  start(worker: Promise<Worker | null>): void {
     this.page.mappingDialog.setMapping(this.#mapping);
     this.page.transport.setHealth("none");
     void this.playback.start();
-    this.stageHost.open();
-    this.early.listen((event) => this.stageHost.onEvent(event));
+    void this.stageHost.open(worker);
     this.avatarSlots.restore(1);
   }
 

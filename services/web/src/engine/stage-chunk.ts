@@ -1,3 +1,3 @@
-/** Bundle of everything that depends on three.js, loaded beside the engine. */
+/** Bundle of everything that depends on three.js, loaded after the page was painted. */
 export { StageController } from "./stage-controller";
 export { describeStage } from "./stage-state";
