@@ -85,13 +85,12 @@ class WebcamController {
   readonly #onVisibilityChange = () => this.#followVisibility();
 
   constructor(private readonly options: WebcamOptions) {
-    this.#card = createWebcamCard(options.root, {
+    this.#card = createWebcamCard(options.root, options.modes, {
       stop: () => this.stop(),
       recalibrate: () => this.#mode.recalibrate(),
       retry: () => this.#start(),
       choose: (mode) => this.#changeMode(mode),
     });
-    this.#card.setModes(options.modes);
     this.#mode = this.#createMode(options.modes[0]);
     document.addEventListener("visibilitychange", this.#onVisibilityChange);
     this.#start();

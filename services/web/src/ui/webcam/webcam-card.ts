@@ -27,8 +27,6 @@ export interface WebcamProblem {
 export interface WebcamCard {
   readonly element: HTMLElement;
   readonly mirror: Mirror;
-  /** Offer these modes, of which the first is chosen. */
-  setModes(modes: readonly ModeName[]): void;
   /** Show what happens. */
   setStatus(text: string): void;
   /** Show the share of something that has been done, 0 to 1; null hides it. */
@@ -40,9 +38,18 @@ export interface WebcamCard {
   remove(): void;
 }
 
-export function createWebcamCard(root: HTMLElement, actions: WebcamActions): WebcamCard {
+/** Create the card in `root`. It offers `modes`, of which the first is chosen. */
+export function createWebcamCard(root: HTMLElement, modes: readonly ModeName[], actions: WebcamActions): WebcamCard {
   const mirror = createMirror();
-  const modes = element("div", { class: "webcam-modes", role: "radiogroup", "aria-label": translate("What to move") });
+  const chooser = element(
+    "div",
+    { class: "webcam-modes", role: "radiogroup", "aria-label": translate("What to move"), hidden: modes.length < 2 },
+    ...modes.map((name, index) => {
+      const onChange = () => actions.choose(name);
+      const radio = element("input", { type: "radio", name: "webcam-mode", checked: index === 0, onChange });
+      return element("label", {}, radio, element("span", {}, translate(MODE_LABELS[name])));
+    }),
+  );
   const status = element("p", { class: "webcam-status", role: "status" });
   const bar = element("i");
   const progress = element("div", { class: "progress", role: "progressbar", hidden: true }, bar);
@@ -73,7 +80,7 @@ export function createWebcamCard(root: HTMLElement, actions: WebcamActions): Web
   const card = element(
     "section",
     { class: "webcam", "aria-label": translate("Camera") },
-    modes,
+    chooser,
     mirror.element,
     progress,
     problem,
@@ -84,16 +91,6 @@ export function createWebcamCard(root: HTMLElement, actions: WebcamActions): Web
   return {
     element: card,
     mirror,
-    setModes(names) {
-      modes.hidden = names.length < 2;
-      modes.replaceChildren(
-        ...names.map((name, index) => {
-          const onChange = () => actions.choose(name);
-          const radio = element("input", { type: "radio", name: "webcam-mode", checked: index === 0, onChange });
-          return element("label", {}, radio, element("span", {}, translate(MODE_LABELS[name])));
-        }),
-      );
-    },
     setStatus: (text) => setText(status, text),
     setProgress(share) {
       progress.hidden = share === null;
