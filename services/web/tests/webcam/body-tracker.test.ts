@@ -2,9 +2,9 @@ import { describe, expect, test } from "vitest";
 import { JOINTS, type Pose, restPose } from "../../src/motion/skeleton";
 import { BodyTracker, type TrackedBody } from "../../src/webcam/body-tracker";
 import { STILL_S } from "../../src/webcam/calibration";
-import type { DetectedBody } from "../../src/webcam/landmark";
 import { turned } from "./arbitrary-body";
 import { ASPECT, type DetectionOptions, detect } from "./detected-body";
+import { FilmSession } from "./film-session";
 import { ARMS_ASIDE, ARMS_DOWN, poseWith } from "./poses";
 
 const FPS = 20;
@@ -26,21 +26,14 @@ const CROUCH = poseWith(
 /** By how much the hips are lower then, in metres. */
 const CROUCH_M = 0.84 * (1 - Math.cos(1));
 
-class Session {
-  readonly tracker = new BodyTracker();
-  now = 0;
-
-  /** Show a picture for a time and return all results. */
-  show(body: DetectedBody | null, seconds: number): TrackedBody[] {
-    const results: TrackedBody[] = [];
-    for (const end = this.now + seconds; this.now < end; this.now += 1 / FPS)
-      results.push(this.tracker.update(body, ASPECT, this.now));
-    return results;
+class Session extends FilmSession<TrackedBody, BodyTracker> {
+  constructor() {
+    super(new BodyTracker(), FPS);
   }
 
   /** Show a picture until all that is smoothed is at rest, and return the pose. */
   settle(pose: Pose, options: DetectionOptions = {}): Pose {
-    return this.show(detect(pose, { distance: DISTANCE, ...options }), 8).at(-1)?.pose as Pose;
+    return this.show(detect(pose, { distance: DISTANCE, ...options }), 8).pose as Pose;
   }
 }
 
@@ -61,13 +54,13 @@ function expectRoot({ root }: Pose, x: number, y: number, z: number): void {
 
 test("a pose follows the calibration and ends with the sight of the person", () => {
   const session = new Session();
-  expect(session.show(null, 0.1).at(-1)).toEqual({ phase: "searching", progress: 0, pose: null, hasFeet: false });
-  expect(session.show(detect(ARMS_DOWN, { distance: DISTANCE }), STILL_S / 2).at(-1)).toMatchObject({
+  expect(session.show(null, 0.1)).toEqual({ phase: "searching", progress: 0, pose: null, hasFeet: false });
+  expect(session.show(detect(ARMS_DOWN, { distance: DISTANCE }), STILL_S / 2)).toMatchObject({
     phase: "calibrating",
     pose: null,
   });
   expectRoot(session.settle(ARMS_DOWN), 0, STANDING_M, 0);
-  expect(session.show(null, 0.1).at(-1)).toMatchObject({ phase: "searching", pose: null });
+  expect(session.show(null, 0.1)).toMatchObject({ phase: "searching", pose: null });
 });
 
 test("arms, and turns of the whole body, are those of the person", () => {
@@ -116,7 +109,7 @@ describe("position", () => {
   test("a jump lifts the figure, and it lands", () => {
     const session = calibrated();
     session.settle(ARMS_DOWN);
-    const jump = session.show(detect(ARMS_DOWN, { distance: DISTANCE, up: 0.35 }), 0.4);
+    const jump = session.showAll(detect(ARMS_DOWN, { distance: DISTANCE, up: 0.35 }), 0.4);
     const heights = jump.map(({ pose }) => pose?.root[1] ?? 0);
     expect(Math.max(...heights)).toBeGreaterThan(STANDING_M + 0.12);
     expectRoot(session.settle(ARMS_DOWN), 0, STANDING_M, 0);
@@ -129,7 +122,7 @@ describe("position", () => {
 
   test("without feet and hips the figure stands where it was", () => {
     const session = calibrated({ distance: 0.8 });
-    const [{ hasFeet, pose }] = session.show(detect(ARMS_DOWN, { distance: 0.8, right: 0.1 }), 0.05);
+    const { hasFeet, pose } = session.show(detect(ARMS_DOWN, { distance: 0.8, right: 0.1 }), 0.05);
     expect(hasFeet).toBe(false);
     expectRoot(pose as Pose, 0, STANDING_M, 0);
   });

@@ -5,20 +5,12 @@ import { HandTracker, type TrackedHands } from "../../src/webcam/hand-tracker";
 import { type DetectedBody, LANDMARK, LANDMARK_STRIDE } from "../../src/webcam/landmark";
 import { HOLD_S } from "../../src/webcam/visibility-gate";
 import { ASPECT, type DetectionOptions, detect, hide, trueReach } from "./detected-body";
+import { FilmSession } from "./film-session";
 import { ARMS_ASIDE, ARMS_DOWN, LEFT_UP } from "./poses";
 
-const FPS = 15;
-
-class Session {
-  readonly tracker = new HandTracker();
-  now = 0;
-
-  /** Show a picture for a time and return the last result. */
-  show(body: DetectedBody | null, seconds: number): TrackedHands {
-    let last = this.tracker.update(body, ASPECT, this.now);
-    for (const end = this.now + seconds; this.now < end; this.now += 1 / FPS)
-      last = this.tracker.update(body, ASPECT, this.now);
-    return last;
+class Session extends FilmSession<TrackedHands, HandTracker> {
+  constructor() {
+    super(new HandTracker(), 15);
   }
 }
 

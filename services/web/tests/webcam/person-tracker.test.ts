@@ -1,22 +1,13 @@
 import { describe, expect, test } from "vitest";
 import { STILL_S } from "../../src/webcam/calibration";
-import type { DetectedBody } from "../../src/webcam/landmark";
 import { FORGET_S, PersonTracker, type TrackedPerson } from "../../src/webcam/person-tracker";
-import { ASPECT, detect } from "./detected-body";
+import { detect } from "./detected-body";
+import { FilmSession } from "./film-session";
 import { ARMS_DOWN } from "./poses";
 
-const FPS = 15;
-
-class Session {
-  readonly tracker = new PersonTracker();
-  now = 0;
-
-  /** Show a picture for a time and return the last result. */
-  show(body: DetectedBody | null, seconds: number): TrackedPerson {
-    let last = this.tracker.update(body, ASPECT, this.now);
-    for (const end = this.now + seconds; this.now < end; this.now += 1 / FPS)
-      last = this.tracker.update(body, ASPECT, this.now);
-    return last;
+class Session extends FilmSession<TrackedPerson, PersonTracker> {
+  constructor() {
+    super(new PersonTracker(), 15);
   }
 }
 

@@ -12,7 +12,7 @@ const UNITS_PER_RADIAN = 32767 / Math.PI;
 /** Samples whose time differs by more from that of a picture are not its own, in milliseconds. */
 const MAX_DIFFERENCE_MS = 8;
 
-/** Bones by the joints at their ends. The person's lower legs are hidden by no clothes, but the feet by shoes. */
+/** Bones of arms and legs by the joints at their ends. */
 const BONES = ["l", "r"].flatMap((side) =>
   [
     ["shoulder", "elbow"],
