@@ -18,7 +18,7 @@ export default defineConfig({
     // The worker has no document to which links could be added.
     modulePreload: false,
     rolldownOptions: { output: { codeSplitting: { groups: startupChunks } } },
-    // three.js is one chunk of about 600 kB that loads after the page has been drawn.
+    // three.js is one chunk of about 480 kB, which loads beside the others.
     chunkSizeWarningLimit: 700,
   },
   // The detector's worker imports modules, as the page does.

@@ -38,7 +38,18 @@ const MANAGER = "three/src/renderers/webxr/WebXRManager.js";
 const COMPLETE = /\/WebXRManager\.js\?complete$/;
 const INSTALLER = /\/src\/immersive\/complete-renderer\.ts$/;
 
-/** Replaces `REPLACED_MODULES`. */
+/**
+ * Methods that the page never calls: three.js's own file format, and picking, which the page does by the positions of
+ * the handles.
+ */
+const UNUSED_METHOD = /^\t(?:toJSON|fromJSON|raycast)\([^)]*\) \{\n.*?^\t\}\n/gms;
+
+/** Remove the unused methods of the classes in a module of three.js. */
+export function removeUnusedMethods(code: string): string {
+  return code.replace(UNUSED_METHOD, "");
+}
+
+/** Replaces `REPLACED_MODULES`, and removes unused methods. */
 export const reducedRenderer: Plugin = {
   name: "reduced-renderer",
   apply: "build",
@@ -51,5 +62,9 @@ export const reducedRenderer: Plugin = {
           export const completeRenderer = () => completeWith(WebXRManager);`;
       return REPLACED_MODULES[MODULE.exec(id)?.[1] ?? ""];
     },
+  },
+  transform: {
+    filter: { id: /\/three\/src\/.*\.js$/, code: /\b(?:toJSON|fromJSON|raycast)\(/ },
+    handler: removeUnusedMethods,
   },
 };

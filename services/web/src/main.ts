@@ -5,8 +5,9 @@
 import { startEngineWorker } from "./app/engine-worker";
 
 if (typeof document === "undefined") {
-  // The renderer loads at the same time; the engine reports it if it does not load.
+  // Renderer and mesh load at the same time; the engine reports it if they do not load.
   import("./engine/stage-chunk").catch(() => undefined);
+  import("./stage/puppet/puppet-geometry").catch(() => undefined);
   // Only errors reach the page, which then runs the engine itself.
   import("./engine/worker").then(({ serveEngine }) => serveEngine()).catch(reportError);
 } else {

@@ -1,17 +1,16 @@
-/** Composition of the page: session, stage, inputs, sound and user interface. */
+/** Composition of the page around the stage: session, inputs, sound and user interface. */
 import { browserSoundPreference } from "../audio/preference";
 import { pageAccess } from "../client/access";
-import type { EngineCommand, StageView } from "../engine/message";
-import { pageLanguage, translate } from "../i18n/translator";
+import type { EngineCommand } from "../engine/message";
+import { translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { loadMapping, saveMapping } from "../input/mapping-store";
 import { FileStore } from "../storage/file-store";
 import { browserStorage } from "../storage/web-storage";
-import { resolveDisplayName } from "../ui/display-name";
 import { createPage, type Page } from "../ui/page";
 import { createTheme, type ThemeChoice } from "../ui/theme";
 import { AvatarSlots } from "./avatar-slot";
-import { EngineConnection } from "./engine-connection";
+import type { EarlyStage } from "./early-stage";
 import { Exporter } from "./exporter";
 import { Invitation } from "./invitation";
 import { LibraryController } from "./library-controller";
@@ -35,27 +34,20 @@ export class App implements AppParts {
   readonly theme: ThemeChoice;
   #mapping: Mapping = loadMapping();
 
-  /** `view` is the view without controls; null for the page with its controls. */
-  constructor(canvas: HTMLCanvasElement, query: URLSearchParams, startup: StartupSequence, view: StageView | null) {
-    const reducedMotion = matchMedia("(prefers-reduced-motion: reduce)");
+  /** `isAlone` is true if the stage is shown without controls. */
+  constructor(
+    canvas: HTMLCanvasElement,
+    startup: StartupSequence,
+    private readonly early: EarlyStage,
+    isAlone: boolean,
+  ) {
+    const { engine, reducedMotion } = early;
     canvas.ariaLabel = translate(
       "A wooden puppet dancing before a disc of gold leaf. Take its hands and legs by button or by the keys 1 to 4.",
     );
-    this.displayName = resolveDisplayName(query, Math.random());
+    this.displayName = early.displayName;
     this.page = createPage(document.body, createUserActions(this));
     const { page } = this;
-    const engine = new EngineConnection(
-      canvas,
-      {
-        server: location.origin,
-        token: pageAccess.token,
-        language: pageLanguage(),
-        timeOrigin: performance.timeOrigin,
-        bestQuality: query.get("quality") === "best",
-        view,
-      },
-      (event) => this.stageHost.onEvent(event),
-    );
     const send = (command: EngineCommand) => engine.post(command);
     this.limbs = new LimbControls(send, createKeyActions(this));
     this.exporter = new Exporter(page, () => this.stageHost.takePicture());
@@ -77,7 +69,7 @@ export class App implements AppParts {
       invitation: new Invitation(page.nameTags),
       getAvatarFiles: () => this.avatarSlots.activeFiles,
       viewOnly: !pageAccess.allows("control"),
-      isAlone: view !== null,
+      isAlone,
       getMapping: () => this.#mapping,
     });
     this.avatarSlots = new AvatarSlots(
@@ -88,8 +80,7 @@ export class App implements AppParts {
       page,
       startup,
       reducedMotion,
-      query,
-      displayName: this.displayName,
+      early,
       library: this.library,
       soundController: this.soundController,
       avatarSlots: this.avatarSlots,
@@ -102,12 +93,13 @@ export class App implements AppParts {
     });
   }
 
-  /** Enter the session and start the engine, in `worker` if there is one, both at the same time. */
-  start(worker: Promise<Worker | null>): void {
+  /** Take over the stage. */
+  start(): void {
     this.page.mappingDialog.setMapping(this.#mapping);
     this.page.transport.setHealth("none");
     void this.playback.start();
-    void this.stageHost.open(worker);
+    this.stageHost.open();
+    this.early.listen((event) => this.stageHost.onEvent(event));
     this.avatarSlots.restore(1);
   }
 

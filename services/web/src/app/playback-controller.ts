@@ -2,13 +2,13 @@
 import { pageAccess } from "../client/access";
 import { createSession, findOrCreateSession, getSession } from "../client/api";
 import { ProblemError } from "../client/problem";
-import type { EngineCommand, PlaybackChange, ViewerTime } from "../engine/message";
-import type { PlaybackKind } from "../engine/playback";
+import type { EngineCommand, PlaybackChange, PlaybackRequest, ViewerTime } from "../engine/message";
 import { translate } from "../i18n/translator";
 import { showProblem } from "../ui/library/upload";
 import type { Page } from "../ui/page";
-import { PHONE } from "../ui/panel";
+import { PHONE } from "../ui/window-shape";
 import type { AvatarSlots } from "./avatar-slot";
+import type { EarlyStage } from "./early-stage";
 import type { LibraryController } from "./library-controller";
 import { RemotePlayback } from "./remote-playback";
 import { restorePosition } from "./saved-position";
@@ -20,9 +20,8 @@ export interface PlaybackControllerOptions {
   startup: StartupSequence;
   /** Matches if the user prefers less motion: a session without viewers then starts paused. */
   reducedMotion: MediaQueryList;
-  /** Query of the page's address, which may name a session or a motion. */
-  query: URLSearchParams;
-  displayName: string;
+  /** What was entered before the page was loaded. */
+  early: Pick<EarlyStage, "displayName" | "entered" | "opened">;
   library: LibraryController;
   soundController: SoundController;
   avatarSlots: AvatarSlots;
@@ -32,7 +31,8 @@ export interface PlaybackControllerOptions {
 
 export class PlaybackController {
   #current: RemotePlayback | null = null;
-  #openedCount = 0;
+  /** Number of the playback that was opened last. */
+  #lastNumber = 0;
   #accessDenied = false;
 
   constructor(private readonly options: PlaybackControllerOptions) {
@@ -72,20 +72,20 @@ export class PlaybackController {
     this.#current?.edit({ loop: !this.#current.timeline?.loop });
   }
 
-  /** Enter the session or motion that the address names, else the running session, else a new one. */
+  /** Show the session or motion that was entered early; without one, enter the running session, else a new one. */
   async start(): Promise<void> {
-    const { library, page, query, reducedMotion, startup } = this.options;
+    const { early, library, page, reducedMotion, startup } = this.options;
     try {
       // The stage does not wait for the library: the list is fetched at the same time.
       const listed = library.refresh();
       const newest = listed.then(() => library.motions.items[0]?.id ?? null);
       // Failures are handled where these promises are awaited below.
       for (const promise of [listed, newest]) promise.catch(() => undefined);
-      const sessionId = query.get("session");
-      const motionId = sessionId ? null : query.get("motion");
-      if (sessionId) this.#open(sessionId);
-      else if (motionId) restorePosition(this.#open(motionId, "motions"));
-      else {
+      const opened = early.opened ?? (await early.entered);
+      if (opened) {
+        const playback = this.#show(opened);
+        if (opened.kind === "motions") restorePosition(playback);
+      } else {
         const session = await findOrCreateSession(newest);
         const playback = session && this.#open(session.id);
         if (playback && reducedMotion.matches && session.viewers === 0) playback.edit({ playing: false });
@@ -125,11 +125,19 @@ export class PlaybackController {
     await this.playMotion(id);
   }
 
-  /** Enter a session or motion, and leave the current one. */
-  #open(id: string, kind: PlaybackKind = "sessions"): RemotePlayback {
-    const { displayName, library, page, send, soundController, startup } = this.options;
-    const playback = new RemotePlayback(++this.#openedCount, id, kind, send);
-    send({ type: "open", playback: { number: playback.number, id, kind, name: displayName } });
+  /** Enter a session, and leave the current one. */
+  #open(id: string): RemotePlayback {
+    const { early, send } = this.options;
+    const playback: PlaybackRequest = { number: this.#lastNumber + 1, id, kind: "sessions", name: early.displayName };
+    send({ type: "open", playback });
+    return this.#show(playback);
+  }
+
+  /** Show a session or motion that the engine enters. */
+  #show({ number, id, kind }: PlaybackRequest): RemotePlayback {
+    const { library, page, send, soundController, startup } = this.options;
+    const playback = new RemotePlayback(number, id, kind, send);
+    this.#lastNumber = number;
     this.#current = playback;
     document.documentElement.toggleAttribute("data-own", kind === "motions");
     startup.runWhenFinished(() => this.#current === playback && soundController.setViewer(playback));

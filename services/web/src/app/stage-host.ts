@@ -12,7 +12,6 @@ import { listenToPointer } from "../input/pointer-events";
 import { LIMBS } from "../motion/skeleton";
 import type { Theme } from "../stage/scenery/look";
 import type { Page } from "../ui/page";
-import { LANDSCAPE_PHONE, PHONE } from "../ui/panel";
 import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
 import { type EngineConnection, EngineError } from "./engine-connection";
@@ -24,6 +23,7 @@ import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
 import { StageOverlay } from "./stage-overlay";
 import type { StartupSequence } from "./startup";
+import { describeViewport } from "./viewport";
 
 /** Limbs of one performer before the engine has reported any. */
 const NO_CLAIMS: ClaimState = {
@@ -69,9 +69,9 @@ export class StageHost {
     );
   }
 
-  /** Start the engine, in the worker if there is one, and pass the inputs to it. */
-  async open(worker: Promise<Worker | null>): Promise<void> {
-    const { engine, reducedMotion } = this.options;
+  /** Pass the state of the page and the inputs to the engine. */
+  open(): void {
+    const { reducedMotion } = this.options;
     this.#setSettings({
       reducedMotion: reducedMotion.matches,
       mapping: this.options.getMapping(),
@@ -90,7 +90,6 @@ export class StageHost {
       this.#setSettings({ isHidden: document.hidden });
       if (document.hidden) this.options.limbs.commands.releaseAll();
     });
-    await engine.start(await worker);
   }
 
   setTheme(theme: Theme): void {
@@ -142,37 +141,17 @@ export class StageHost {
 
   /** Fit the picture to the window, beside the panels that are open. */
   resize(): void {
-    const { panels } = this.options.page;
-    const framing = this.options.isAlone
-      ? "alone"
-      : LANDSCAPE_PHONE.matches
-        ? "sideways"
-        : !PHONE.matches
-          ? "desktop"
-          : panels.isSheetOpen
-            ? "sheet"
-            : "phone";
-    this.#setSettings({
-      viewport: {
-        width: innerWidth,
-        height: innerHeight,
-        framing,
-        pixelRatio: devicePixelRatio,
-        sideInsets: framing === "desktop" || framing === "sideways" ? panels.sideInsets : [0, 0],
-        bottomInset: framing === "alone" ? 0 : panels.bottomInset,
-      },
-    });
+    this.#setSettings({ viewport: describeViewport(this.options.isAlone, this.options.page.panels) });
   }
 
   /** Handle an event of the engine. */
   onEvent(event: EngineEvent): void {
-    const { invitation, limbs, page, startup, viewOnly } = this.options;
+    const { invitation, limbs, page, viewOnly } = this.options;
     const playback = this.options.getPlayback();
     switch (event.type) {
       case "ready":
         this.#isReady = true;
         limbs.isReady = true;
-        startup.onStageReady();
         break;
       case "unavailable":
         limbs.isReady = false;
@@ -182,10 +161,6 @@ export class StageHost {
         playback.onTime(event.playback, event.time);
         this.#overlay.update(event.changes);
         if (event.changes?.hasPose && !viewOnly) invitation.start();
-        if (event.changes?.hasDrawnPerformer) {
-          document.documentElement.dataset["drawn"] = "";
-          startup.finish();
-        }
         break;
       case "playback":
         playback.onChange(event.playback, event.change);
@@ -277,9 +252,8 @@ export class StageHost {
     else page.notice("graphics", null);
   }
 
-  /** Report that there will be no stage, and run the callbacks that wait for the first frame. */
+  /** Report that there will be no stage. */
   #showUnavailable(reason: "graphics" | "not loaded"): void {
-    this.options.startup.finish();
     this.options.page.notice(
       "graphics",
       translate("This browser cannot draw the stage"),

@@ -1,12 +1,15 @@
-/** Start of the page. */
+/** Start of the page: the stage first, then the page around it. */
 import { consumeUrlToken, pageAccess } from "../client/access";
 import type { StageView } from "../engine/message";
-import { loadPageLanguage } from "../i18n/language";
-import { App } from "./app";
+import { loadPageLanguage, selectPageLanguage } from "../i18n/language";
+import { EarlyStage } from "./early-stage";
 import { readStageView, StageViewError } from "./stage-view";
 import { StartupSequence } from "./startup";
 
-/** Build the page around its stage. `worker` resolves with the worker of its engine, or with null if there is none. */
+/**
+ * Start the stage, and build the page around it. `worker` resolves with the worker of its engine, or with null if there
+ * is none.
+ */
 export async function startPage(worker: Promise<Worker | null>): Promise<void> {
   // Remove the token from the address before anything else can read or share that address.
   consumeUrlToken();
@@ -18,10 +21,32 @@ export async function startPage(worker: Promise<Worker | null>): Promise<void> {
   root.dataset["role"] = pageAccess.role;
   if (pageAccess.isRestricted) root.dataset["bound"] = "";
   const startup = new StartupSequence(root);
-  // The language must be known before any text is shown.
-  root.lang = await loadPageLanguage(query);
   const canvas = document.querySelector<HTMLCanvasElement>("#stage") as HTMLCanvasElement;
-  new App(canvas, query, startup, view).start(worker);
+  const early = new EarlyStage(
+    canvas,
+    query,
+    {
+      server: location.origin,
+      token: pageAccess.token,
+      language: selectPageLanguage(query),
+      timeOrigin: performance.timeOrigin,
+      bestQuality: query.get("quality") === "best",
+      view,
+    },
+    startup,
+  );
+  void early.start(worker);
+  const language = loadPageLanguage(query);
+  await startup.pageDue;
+  // Both at the same time: a script that imports styles loads after them.
+  const [{ App }] = await Promise.all([import("./app"), import("../style/page.css")]).catch((error) => {
+    early.listen(() => undefined);
+    throw error;
+  });
+  // The language must be known before any text is shown.
+  root.lang = await language;
+  new App(canvas, startup, early, view !== null).start();
+  startup.onPageBuilt();
 }
 
 /**

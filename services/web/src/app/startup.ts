@@ -1,18 +1,25 @@
 /**
- * Order of the page's start: the puppet first. Fonts, sound and other work wait for the first frame, since they share
- * its connection and, with software rendering, its processor. Timeouts bound the wait if no motion or no stage
- * arrives.
+ * Order of the page's start: the puppet first. The page around it, fonts, sound and other work wait for the scripts of
+ * the stage or for the first frame, since they share its connection and, with software rendering, its processor.
+ * Timeouts bound the wait if no motion or no stage arrives.
  */
 
-/** Time after which the page is shown without its stage, which is still loading over a slow connection. */
+/** Time after which the page loads although its stage is still loading over a slow connection. */
+const PAGE_LOAD_TIMEOUT_MS = 2_000;
+/** Time after which the page is shown without its stage. */
 const STAGE_TIMEOUT_MS = 2_500;
 /** Longest wait for the first frame after the stage is ready. */
 const FIRST_FRAME_TIMEOUT_MS = 2_000;
 
 export class StartupSequence {
+  /** Resolves when the page around the stage shall be loaded. */
+  readonly pageDue: Promise<void>;
+  #setPageDue: () => void = () => undefined;
   /** Callbacks that wait for the first frame; null after it. */
   #callbacks: (() => void)[] | null = [];
   #stageReady = false;
+  #isStageLate = false;
+  #isPageBuilt = false;
 
   /**
    * Start at once. The attribute `data-arriving` of `root` carries the state for the style sheet: `veiled` (as in the
@@ -21,7 +28,12 @@ export class StartupSequence {
    */
   constructor(private readonly root: HTMLElement) {
     root.dataset["arriving"] = "veiled";
-    setTimeout(() => this.#revealPage(), STAGE_TIMEOUT_MS);
+    this.pageDue = new Promise((resolve) => (this.#setPageDue = resolve));
+    setTimeout(() => this.loadPage(), PAGE_LOAD_TIMEOUT_MS);
+    setTimeout(() => {
+      this.#isStageLate = true;
+      this.#revealPage();
+    }, STAGE_TIMEOUT_MS);
   }
 
   /** Call `callback` after the first frame, at once if it was drawn already. */
@@ -30,14 +42,26 @@ export class StartupSequence {
     else callback();
   }
 
+  /** Load the page around the stage: its scripts no longer delay the first frame, or there will be none. */
+  loadPage(): void {
+    this.#setPageDue();
+  }
+
   /** Report that the stage is loaded. The first frame is expected soon. */
   onStageReady(): void {
     this.#stageReady = true;
     setTimeout(() => this.finish(), FIRST_FRAME_TIMEOUT_MS);
   }
 
+  /** Report that the page around the stage is built. */
+  onPageBuilt(): void {
+    this.#isPageBuilt = true;
+    this.#revealPage();
+  }
+
   /** Reveal the page and run all waiting callbacks: the first frame was drawn, or there will be none. */
   finish(): void {
+    this.loadPage();
     const callbacks = this.#callbacks;
     if (!callbacks) return;
     this.#callbacks = null;
@@ -46,6 +70,7 @@ export class StartupSequence {
   }
 
   #revealPage(): void {
-    if (this.#callbacks && !this.#stageReady) this.root.dataset["arriving"] = "";
+    if (!this.#callbacks || this.#stageReady) return;
+    if (this.#isStageLate && this.#isPageBuilt) this.root.dataset["arriving"] = "";
   }
 }

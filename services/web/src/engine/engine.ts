@@ -8,6 +8,8 @@ import { ProblemError } from "../client/problem";
 import { createPageActions } from "../input/command-dispatcher";
 import type { HandState } from "../input/hand";
 import { DEFAULT_MAPPING } from "../input/mapping";
+import type { Figure } from "../motion/skeleton";
+import type { Detail } from "../stage/puppet/surface";
 import type { StageCanvas } from "../stage/rendering/canvas";
 import { type Graphics, openGraphics } from "../stage/rendering/graphics";
 import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
@@ -55,6 +57,8 @@ export class Engine {
   readonly #clockShiftMs: number;
   #controller: StageController | null = null;
   #describeStage: typeof import("./stage-state").describeStage | null = null;
+  /** Builds a mesh for the stage; null while its code is not loaded. */
+  #prepareMesh: ((figure: Figure) => void) | null = null;
   #playback: Playback | null = null;
   #playbackNumber = 0;
   readonly #statisticsTimer: ReturnType<typeof setInterval>;
@@ -100,11 +104,13 @@ export class Engine {
       this.send({ type: "unavailable", reason: "graphics" });
       return;
     }
+    void this.#loadMesh(graphics.quality.quality.simpleMaterials ? "coarse" : "full");
     const chunk = await import("./stage-chunk").catch(() => null);
     if (!chunk) {
       this.send({ type: "unavailable", reason: "not loaded" });
       return;
     }
+    this.send({ type: "loaded" });
     // Handle messages that arrived meanwhile first: the requests they lead to are sent before the stage is built.
     await new Promise((resolve) => setTimeout(resolve));
     if (this.#isClosed) return;
@@ -205,6 +211,20 @@ export class Engine {
     }
   }
 
+  /** Load the code of the puppet's mesh, which is smaller than the renderer. Without it the stage will not load either. */
+  async #loadMesh(detail: Detail): Promise<void> {
+    const mesh = await import("../stage/puppet/puppet-geometry").catch(() => null);
+    this.#prepareMesh = (figure) => mesh?.preparePuppetGeometry(figure, detail);
+    if (!this.#controller) this.#updatePerformers();
+  }
+
+  /** Show the performers of the playback. While the renderer loads, build the mesh of the first. */
+  #updatePerformers(): void {
+    const figure = this.#playback?.viewer.figure;
+    if (this.#controller) this.#controller.updatePerformers();
+    else if (figure) this.#prepareMesh?.(figure);
+  }
+
   #build(controller: StageController): void {
     const { canvas } = this;
     this.#controller = controller;
@@ -248,8 +268,7 @@ export class Engine {
     };
     viewer.addEventListener("open", () => setConnected(true));
     viewer.addEventListener("closed", () => setConnected(false));
-    for (const event of ["figure", "tracks"])
-      viewer.addEventListener(event, () => this.#controller?.updatePerformers());
+    for (const event of ["figure", "tracks"]) viewer.addEventListener(event, () => this.#updatePerformers());
     publishPlayback(playback, (change) => {
       if (number === this.#playbackNumber) this.send({ type: "playback", playback: number, change });
     });

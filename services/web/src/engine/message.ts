@@ -210,6 +210,8 @@ export type PlaybackChange =
   | { event: "audio packets"; packets: readonly { readonly number: number; readonly data: Uint8Array }[] };
 
 export type EngineEvent =
+  /** The scripts of the stage have loaded. */
+  | { type: "loaded" }
   | { type: "ready" }
   /** There will be no stage. */
   | { type: "unavailable"; reason: "graphics" | "not loaded" }

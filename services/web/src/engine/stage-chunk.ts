@@ -1,3 +1,3 @@
-/** Bundle of everything that depends on three.js, loaded after the page was painted. */
+/** Bundle of everything that depends on three.js, loaded beside the engine. */
 export { StageController } from "./stage-controller";
 export { describeStage } from "./stage-state";

@@ -23,8 +23,13 @@ export function selectLanguage(
 
 /** Load the page's language. Call this before any text is shown. Falls back to English if Japanese cannot be loaded. */
 export async function loadPageLanguage(query: URLSearchParams): Promise<Language> {
-  await loadLanguage(selectLanguage(query.get("lang"), browserStorage.get(STORAGE_KEY), navigator.languages));
+  await loadLanguage(selectPageLanguage(query));
   return pageLanguage();
+}
+
+/** Return the page's language, which is not loaded by this. */
+export function selectPageLanguage(query: URLSearchParams): Language {
+  return selectLanguage(query.get("lang"), browserStorage.get(STORAGE_KEY), navigator.languages);
 }
 
 /** Load the translations of a language and use them from now on. Falls back to English if they cannot be loaded. */

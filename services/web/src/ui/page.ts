@@ -14,13 +14,14 @@ import { createMessageArea, type MessageArea } from "./notification/message-area
 import { createNotice, type ShowNotice } from "./notification/notice";
 import { createToast, type ToastController } from "./notification/toast";
 import { createOccupiedArea } from "./occupied-area";
-import { createPanels, type Panels, PHONE } from "./panel";
+import { createPanels, type Panels } from "./panel";
 import type { LabelMetrics } from "./strings/label-layout";
 import { createLimbRequests, type LimbRequests } from "./strings/limb-request";
 import { createNameTags, type NameTags } from "./strings/name-tag";
 import { createStringsPanel, type StringsActions, type StringsPanel } from "./strings/strings-panel";
 import type { SoundActions } from "./transport/sound-control";
 import { createTransport, type PanelName, type Transport } from "./transport/transport";
+import { PHONE } from "./window-shape";
 
 export interface UserActions extends StringsActions, SoundActions, AvatarActions {
   share(): void;

@@ -3,12 +3,7 @@ import { translate } from "../i18n/translator";
 import { element } from "./dom";
 import { icon } from "./icon";
 import type { PanelName } from "./transport/transport";
-
-/** Phone in landscape: the window is so low that panels cover its right side. */
-const LANDSCAPE_PHONE_QUERY = "(max-height: 460px) and (orientation: landscape)";
-export const LANDSCAPE_PHONE = matchMedia(LANDSCAPE_PHONE_QUERY);
-/** Windows in which panels are sheets. */
-export const PHONE = matchMedia(`(max-width: 720px), ${LANDSCAPE_PHONE_QUERY}`);
+import { DOCK_WIDTH_PX, LANDSCAPE_DOCK_WIDTH_PX, LANDSCAPE_PHONE, PHONE } from "./window-shape";
 
 export interface Panel {
   readonly element: HTMLElement;
@@ -53,12 +48,10 @@ export interface Panels {
   readonly bottomInset: number;
 }
 
-/** Widths of a panel and of the dock with their margins; the dock with part of its names (art direction, section 6). */
+/** Width of a panel with its margins. */
 const PANEL_WIDTH_PX = 356;
-const DOCK_WIDTH_PX = 96;
 /** Widths on a landscape phone, where a sheet has a maximum share of the window's width (`style/sideways.css`). */
 const [SHEET_MAX_WIDTH_PX, SHEET_MAX_WIDTH_SHARE] = [340, 0.56];
-const LANDSCAPE_DOCK_WIDTH_PX = 112;
 /** Smallest windows with space for panels at both sides, and for two panels at the right, one above the other. */
 const [TWO_SIDES_MIN_WIDTH_PX, TWO_PANELS_MIN_HEIGHT_PX] = [900, 740];
 

@@ -3,21 +3,25 @@ import type { Theme } from "../stage/scenery/look";
 import { browserStorage } from "../storage/web-storage";
 
 const STORAGE_KEY = "bunraku.theme";
+const LIGHT_SCHEME = "(prefers-color-scheme: light)";
 
 export interface ThemeChoice {
   readonly theme: Theme;
   toggle(): void;
 }
 
+/** Apply the current theme to the document, and return it. */
+export function applyTheme(theme = storedTheme() ?? systemTheme()): Theme {
+  document.documentElement.dataset.theme = theme;
+  return theme;
+}
+
 /** Apply the theme to the document, now and whenever it changes. `onChange` is called each time, also at once. */
 export function createTheme(onChange: (theme: Theme) => void): ThemeChoice {
-  const system = matchMedia("(prefers-color-scheme: light)");
+  const system = matchMedia(LIGHT_SCHEME);
   let chosen = storedTheme();
   const current = (): Theme => chosen ?? (system.matches ? "day" : "night");
-  const apply = () => {
-    document.documentElement.dataset.theme = current();
-    onChange(current());
-  };
+  const apply = () => onChange(applyTheme(current()));
   system.addEventListener("change", apply);
   apply();
   return {
@@ -30,6 +34,10 @@ export function createTheme(onChange: (theme: Theme) => void): ThemeChoice {
       apply();
     },
   };
+}
+
+function systemTheme(): Theme {
+  return matchMedia(LIGHT_SCHEME).matches ? "day" : "night";
 }
 
 function storedTheme(): Theme | null {

@@ -9,6 +9,7 @@ function createStartup(): { startup: StartupSequence; calls: string[]; state: ()
   const startup = new StartupSequence(root);
   const calls: string[] = [];
   startup.runWhenFinished(() => void calls.push("sound"));
+  void startup.pageDue.then(() => startup.onPageBuilt());
   return { startup, calls, state: () => root.dataset["arriving"] };
 }
 
@@ -25,9 +26,9 @@ test("first frame reveals the page and runs waiting callbacks once", () => {
   expect([state(), calls]).toEqual([undefined, ["sound"]]);
 });
 
-test("slow stage reveals the page, and callbacks keep waiting for the first frame", () => {
+test("slow stage reveals the page, and callbacks keep waiting for the first frame", async () => {
   const { startup, calls, state } = createStartup();
-  vi.advanceTimersByTime(2_500);
+  await vi.advanceTimersByTimeAsync(2_500);
   expect([state(), calls]).toEqual(["", []]);
   vi.advanceTimersByTime(60_000);
   expect([state(), calls]).toEqual(["", []]);
@@ -48,4 +49,31 @@ test("callbacks run at once after the first frame", () => {
   startup.finish();
   startup.runWhenFinished(() => void calls.push("later"));
   expect(calls).toEqual(["sound", "later"]);
+});
+
+function watchPageDue(startup: StartupSequence): () => boolean {
+  let isDue = false;
+  void startup.pageDue.then(() => (isDue = true));
+  return () => isDue;
+}
+
+test("page loads once the scripts of the stage have, or after a timeout", async () => {
+  for (const isLoaded of [true, false]) {
+    const { startup } = createStartup();
+    const isDue = watchPageDue(startup);
+    await vi.advanceTimersByTimeAsync(1_999);
+    expect(isDue()).toBe(false);
+    if (isLoaded) startup.loadPage();
+    await vi.advanceTimersByTimeAsync(isLoaded ? 0 : 1);
+    expect(isDue()).toBe(true);
+  }
+});
+
+test("page that is built late is not revealed before, and the seal stays", async () => {
+  const root = { dataset: {} as DOMStringMap } as HTMLElement;
+  const startup = new StartupSequence(root);
+  await vi.advanceTimersByTimeAsync(10_000);
+  expect(root.dataset["arriving"]).toBe("veiled");
+  startup.onPageBuilt();
+  expect(root.dataset["arriving"]).toBe("");
 });

@@ -7,12 +7,16 @@ export type Position = [number, number, number];
 /** Indices of limbs. */
 export const [LEFT_HAND, RIGHT_LEG] = [0, 3];
 
-/** Wait until the first pose is drawn. The first frame compiles the shaders, which blocks a slow machine. */
+/**
+ * Wait until the first pose is drawn and the page around the stage, which loads later, handles keys. The first frame
+ * compiles the shaders, which blocks a slow machine.
+ */
 export async function waitForFirstPose(page: Page): Promise<void> {
   await waitInEngine(page, () => {
     const stage = globalThis.bunraku?.stage;
     return Boolean(stage?.puppet?.group.visible && stage.hasDrawnPerformer);
   });
+  await page.waitForFunction(() => window.bunraku?.listening !== undefined);
 }
 
 /**

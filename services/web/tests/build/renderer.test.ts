@@ -1,8 +1,8 @@
 /** Modules of three.js's renderer that the build of the page replaces. */
-import { readFileSync } from "node:fs";
+import { globSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { expect, test } from "vitest";
-import { REPLACED_MODULES } from "../../vite.renderer.ts";
+import { REPLACED_MODULES, removeUnusedMethods } from "../../vite.renderer.ts";
 
 const SOURCES = resolve(import.meta.dirname, "../../node_modules/three/src");
 /** Members that the renderer uses only while a session is presented, in the present version of three.js. */
@@ -53,4 +53,24 @@ test("the replaced groups of uniforms have what the renderer uses without groups
     Array.from(read("renderers/WebGLRenderer.js").matchAll(/uniformsGroups\.(\w+)\(/g), ([, member]) => member),
   );
   expect([...used].filter((member) => !(member in groups)).sort()).toEqual(["bind", "update"]);
+});
+
+test("methods that are removed as unused are called by none of the others", () => {
+  // Loaders of three.js's own format and classes for picking are not part of the page.
+  const files = globSync("{core,cameras,lights,materials,math,objects,renderers/webgl,scenes,textures}/*.js", {
+    cwd: SOURCES,
+  });
+  expect(files.length).toBeGreaterThan(100);
+  let removedBytes = 0;
+  for (const file of files) {
+    const code = read(file);
+    const reduced = removeUnusedMethods(code);
+    removedBytes += code.length - reduced.length;
+    const calls = reduced.replace(/\/\*.*?\*\//gs, "").match(/\.(toJSON|fromJSON|raycast)\(/g) ?? [];
+    expect([file, calls]).toEqual([file, file === "core/Raycaster.js" ? [".raycast("] : []]);
+    // Whole methods only: the number of open blocks stays even.
+    const count = (character: string) => reduced.split(character).length - code.split(character).length;
+    expect([file, count("{")]).toEqual([file, count("}")]);
+  }
+  expect(removedBytes).toBeGreaterThan(40_000);
 });

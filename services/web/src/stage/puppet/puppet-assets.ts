@@ -9,30 +9,13 @@ import {
   type ShaderMaterial,
   Vector3,
 } from "three";
-import { type Figure, figureKey, JOINTS } from "../../motion/skeleton";
+import { type Figure, figureKey } from "../../motion/skeleton";
 import { type DistantLights, updateDistantLights } from "./distant-lights";
-import { fitToFigure } from "./figure-fit";
-import { GeometryBuilder } from "./geometry-builder";
 import { createFigureMaterial, createSimpleFigureMaterial, type PuppetTextures } from "./material";
-import { addArms } from "./parts/arms";
-import { addBodice } from "./parts/bodice";
-import { addHakama } from "./parts/hakama";
-import { addHead } from "./parts/head";
-import { addLegs } from "./parts/legs";
-import { addSleeves } from "./parts/sleeves";
+import { takePuppetGeometry } from "./puppet-geometry";
 import type { Detail } from "./surface";
 
-/** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
-export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
-
 const centre = new Vector3();
-
-/** Build all parts on a figure in its rest pose. Needs no graphics context. */
-export function buildPuppetGeometry(figure: Figure, detail: Detail): BufferGeometry {
-  const builder = new GeometryBuilder(BONES, fitToFigure(figure), detail);
-  for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(builder);
-  return builder.build();
-}
 
 export class PuppetAssets {
   readonly material: Material;
@@ -72,7 +55,7 @@ export class PuppetAssets {
     const key = figureKey(figure);
     const ofFigure = this.#geometries.get(key) ?? new Map<Detail, BufferGeometry>();
     this.#geometries.set(key, ofFigure);
-    const geometry = ofFigure.get(detail) ?? buildPuppetGeometry(figure, detail);
+    const geometry = ofFigure.get(detail) ?? takePuppetGeometry(figure, detail);
     ofFigure.set(detail, geometry);
     return geometry;
   }

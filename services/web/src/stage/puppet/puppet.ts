@@ -13,7 +13,8 @@ import {
 import { type Figure, JOINTS, PARENTS, type Pose } from "../../motion/skeleton";
 import { figureScale, restPositions } from "./figure-fit";
 import { floorHeight, handlePosition, type Performer } from "./performer";
-import { BONES, type PuppetAssets } from "./puppet-assets";
+import type { PuppetAssets } from "./puppet-assets";
+import { BONES } from "./puppet-geometry";
 import { SleeveBone } from "./sleeve-bone";
 import { SIDES } from "./standard-figure";
 

@@ -3,7 +3,7 @@ import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { JOINTS } from "../../../src/motion/skeleton";
 import { figureScale, fitToFigure, restPositions } from "../../../src/stage/puppet/figure-fit";
-import { BONES } from "../../../src/stage/puppet/puppet-assets";
+import { BONES } from "../../../src/stage/puppet/puppet-geometry";
 import {
   CROWN,
   HEAD_CENTRE,

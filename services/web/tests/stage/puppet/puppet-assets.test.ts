@@ -1,6 +1,8 @@
 import { type BufferAttribute, type BufferGeometry, Texture } from "three";
-import { describe, expect, test } from "vitest";
-import { BONES, buildPuppetGeometry, PuppetAssets } from "../../../src/stage/puppet/puppet-assets";
+import { describe, expect, test, vi } from "vitest";
+import { GeometryBuilder } from "../../../src/stage/puppet/geometry-builder";
+import { PuppetAssets } from "../../../src/stage/puppet/puppet-assets";
+import { BONES, buildPuppetGeometry, preparePuppetGeometry } from "../../../src/stage/puppet/puppet-geometry";
 import { createOtherFigure, createStandardFigure } from "./figures";
 
 function geometryAttribute(attributes: BufferGeometry["attributes"], name: string) {
@@ -62,4 +64,20 @@ test("figures of equal lengths share a mesh, which is disposed of after use", ()
   assets.retainOnly([createStandardFigure()]);
   expect(disposed).toEqual([other]);
   expect(assets.geometryFor(createStandardFigure(), "full")).toBe(shape);
+});
+
+test("a mesh that was built ahead is used once, and only for its figure and detail", () => {
+  const create = () => new PuppetAssets({ face: new Texture(), asanoha: new Texture() }, { value: 0 });
+  const build = vi.spyOn(GeometryBuilder.prototype, "build");
+  preparePuppetGeometry(createStandardFigure(), "coarse");
+  preparePuppetGeometry(createStandardFigure(), "coarse");
+  expect(build).toHaveBeenCalledTimes(1);
+  const ahead = create().geometryFor(createStandardFigure(), "coarse");
+  expect(build).toHaveBeenCalledTimes(1);
+  expect(create().geometryFor(createStandardFigure(), "coarse")).not.toBe(ahead);
+  preparePuppetGeometry(createStandardFigure(), "coarse");
+  const full = create().geometryFor(createStandardFigure(), "full");
+  expect(full.index?.count).toBeGreaterThan(ahead.index?.count ?? 0);
+  expect(build).toHaveBeenCalledTimes(4);
+  build.mockRestore();
 });
