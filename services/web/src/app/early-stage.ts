@@ -51,7 +51,7 @@ export class EarlyStage {
       },
     });
     // Nothing will be drawn, or it is not known what: the page says why.
-    void this.entered.then((opened) => opened ?? this.startup.loadPage());
+    void this.entered.then((opened) => opened ?? this.startup.buildPage());
     await this.engine.start(await worker);
   }
 

@@ -37,12 +37,14 @@ export async function startPage(worker: Promise<Worker | null>): Promise<void> {
   );
   void early.start(worker);
   const language = loadPageLanguage(query);
-  await startup.pageDue;
+  await startup.loadDue;
   // Both at the same time: a script that imports styles loads after them.
   const [{ App }] = await Promise.all([import("./app"), import("../style/page.css")]).catch((error) => {
     early.listen(() => undefined);
     throw error;
   });
+  // Building it would compete with the first frame, which takes all processors of a machine that renders in software.
+  await startup.buildDue;
   // The language must be known before any text is shown.
   root.lang = await language;
   new App(canvas, startup, early, view !== null).start();

@@ -13,8 +13,11 @@ const FIRST_FRAME_TIMEOUT_MS = 2_000;
 
 export class StartupSequence {
   /** Resolves when the page around the stage shall be loaded. */
-  readonly pageDue: Promise<void>;
-  #setPageDue: () => void = () => undefined;
+  readonly loadDue: Promise<void>;
+  /** Resolves when the page around the stage shall be built: the first frame was drawn, is late, or there will be none. */
+  readonly buildDue: Promise<void>;
+  #setLoadDue: () => void = () => undefined;
+  #setBuildDue: () => void = () => undefined;
   /** Callbacks that wait for the first frame; null after it. */
   #callbacks: (() => void)[] | null = [];
   #stageReady = false;
@@ -28,10 +31,12 @@ export class StartupSequence {
    */
   constructor(private readonly root: HTMLElement) {
     root.dataset["arriving"] = "veiled";
-    this.pageDue = new Promise((resolve) => (this.#setPageDue = resolve));
+    this.loadDue = new Promise((resolve) => (this.#setLoadDue = resolve));
+    this.buildDue = new Promise((resolve) => (this.#setBuildDue = resolve));
     setTimeout(() => this.loadPage(), PAGE_LOAD_TIMEOUT_MS);
     setTimeout(() => {
       this.#isStageLate = true;
+      this.buildPage();
       this.#revealPage();
     }, STAGE_TIMEOUT_MS);
   }
@@ -42,9 +47,15 @@ export class StartupSequence {
     else callback();
   }
 
-  /** Load the page around the stage: its scripts no longer delay the first frame, or there will be none. */
+  /** Load the page around the stage: the scripts of the stage no longer need the connection. */
   loadPage(): void {
-    this.#setPageDue();
+    this.#setLoadDue();
+  }
+
+  /** Load and build the page around the stage, without waiting for the first frame. */
+  buildPage(): void {
+    this.loadPage();
+    this.#setBuildDue();
   }
 
   /** Report that the stage is loaded. The first frame is expected soon. */
@@ -61,7 +72,7 @@ export class StartupSequence {
 
   /** Reveal the page and run all waiting callbacks: the first frame was drawn, or there will be none. */
   finish(): void {
-    this.loadPage();
+    this.buildPage();
     const callbacks = this.#callbacks;
     if (!callbacks) return;
     this.#callbacks = null;

@@ -34,22 +34,23 @@ async function startStage(query = "") {
   };
   const canvas = { transferControlToOffscreen: () => "offscreen" } as unknown as HTMLCanvasElement;
   const startup = new StartupSequence(root as unknown as HTMLElement);
-  let isPageDue = false;
-  void startup.pageDue.then(() => (isPageDue = true));
+  const due: string[] = [];
+  void startup.loadDue.then(() => due.push("load"));
+  void startup.buildDue.then(() => due.push("build"));
   const stage = new EarlyStage(canvas, new URLSearchParams(query), OPTIONS, startup);
   await stage.start(Promise.resolve(worker as unknown as Worker));
   await stage.entered;
   const findCommand = (type: string) => commands.find((command) => command.type === type);
-  return { findCommand, isPageDue: () => isPageDue, send: (data: EngineEvent) => worker.onmessage?.({ data }), stage };
+  return { findCommand, due, send: (data: EngineEvent) => worker.onmessage?.({ data }), stage };
 }
 
 test("the running session is entered before the page loads", async () => {
-  const { findCommand, isPageDue, stage } = await startStage();
+  const { due, findCommand, stage } = await startStage();
   expect(stage.opened).toMatchObject({ number: 1, id: "running", kind: "sessions" });
   expect(findCommand("open")).toEqual({ type: "open", playback: stage.opened });
   expect(findCommand("set")).toMatchObject({ settings: { theme: "night", viewport: { sideInsets: [96, 96] } } });
   expect(findCommand("edit")).toBeUndefined();
-  expect(isPageDue()).toBe(false);
+  expect(due).toEqual([]);
 });
 
 test("the session or motion that the address names is entered", async () => {
@@ -64,9 +65,9 @@ test("a session without viewers starts paused for those who prefer less motion",
 
 test("without a session, or if it is not found, the page loads at once and has to enter one", async () => {
   for (sessions of [[], null]) {
-    const { isPageDue, stage } = await startStage();
+    const { due, stage } = await startStage();
     expect([await stage.entered, stage.opened]).toEqual([null, null]);
-    expect(isPageDue()).toBe(true);
+    expect(due).toEqual(["load", "build"]);
   }
 });
 
@@ -82,10 +83,12 @@ test("the page receives the events that came before it, then the later ones, in 
 });
 
 test("loaded scripts of the stage load the page, and the first frame ends the startup without it", async () => {
-  const { isPageDue, send } = await startStage();
+  const { due, send } = await startStage();
   send({ type: "loaded" });
   await vi.advanceTimersByTimeAsync(0);
-  expect([isPageDue(), root.dataset["arriving"]]).toEqual([true, "veiled"]);
+  expect([due, root.dataset["arriving"]]).toEqual([["load"], "veiled"]);
   send(DRAWN);
+  await vi.advanceTimersByTimeAsync(0);
+  expect(due).toEqual(["load", "build"]);
   expect(root.dataset["arriving"]).toBeUndefined();
 });

@@ -9,7 +9,7 @@ function createStartup(): { startup: StartupSequence; calls: string[]; state: ()
   const startup = new StartupSequence(root);
   const calls: string[] = [];
   startup.runWhenFinished(() => void calls.push("sound"));
-  void startup.pageDue.then(() => startup.onPageBuilt());
+  void startup.buildDue.then(() => startup.onPageBuilt());
   return { startup, calls, state: () => root.dataset["arriving"] };
 }
 
@@ -51,20 +51,33 @@ test("callbacks run at once after the first frame", () => {
   expect(calls).toEqual(["sound", "later"]);
 });
 
-function watchPageDue(startup: StartupSequence): () => boolean {
+function watch(due: Promise<void>): () => boolean {
   let isDue = false;
-  void startup.pageDue.then(() => (isDue = true));
+  void due.then(() => (isDue = true));
   return () => isDue;
 }
 
 test("page loads once the scripts of the stage have, or after a timeout", async () => {
   for (const isLoaded of [true, false]) {
     const { startup } = createStartup();
-    const isDue = watchPageDue(startup);
+    const isDue = watch(startup.loadDue);
     await vi.advanceTimersByTimeAsync(1_999);
     expect(isDue()).toBe(false);
     if (isLoaded) startup.loadPage();
     await vi.advanceTimersByTimeAsync(isLoaded ? 0 : 1);
+    expect(isDue()).toBe(true);
+  }
+});
+
+test("page is built after the first frame, or once that is late", async () => {
+  for (const isDrawn of [true, false]) {
+    const { startup } = createStartup();
+    const isDue = watch(startup.buildDue);
+    startup.loadPage();
+    await vi.advanceTimersByTimeAsync(2_499);
+    expect(isDue()).toBe(false);
+    if (isDrawn) startup.finish();
+    await vi.advanceTimersByTimeAsync(isDrawn ? 0 : 1);
     expect(isDue()).toBe(true);
   }
 });
