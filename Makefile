@@ -119,7 +119,7 @@ prior: .setup/python
 bench-audio: setup
 	cd services/web && BUNRAKU_BENCH=1 npx vitest run tests/browser/audio.test.ts -t "clicks are heard in time"
 
-# test the page in Firefox and WebKitGTK, also what is too slow for `make test`: needs firefox-esr, webkit2gtk-driver, xvfb
+# test the page in Firefox and WebKitGTK, also what is too slow for `make test`: needs firefox-esr, webkit2gtk-driver, xvfb, pulseaudio
 test-webdriver: setup
 	cd services/web && npx vitest run --project webdriver --project webdriver-slow
 

@@ -13,8 +13,10 @@ import {
   removeFolder,
   startProcess,
   startVirtualDisplay,
+  startVirtualSpeaker,
   stopProcess,
   type VirtualDisplay,
+  type VirtualSpeaker,
 } from "./processes";
 
 type Parameters = Record<string, unknown>;
@@ -85,8 +87,6 @@ const PREFERENCES = {
   // Fewer processes start faster.
   "dom.ipc.processPrelaunch.enabled": false,
   "fission.autostart": false,
-  // An audio device without hardware, or an AudioContext would never run.
-  "media.cubeb.force_mock_context": true,
   "browser.download.folderList": 2,
   // The list of downloads would take the focus of the page, and its keys.
   "browser.download.alwaysOpenPanel": false,
@@ -122,17 +122,19 @@ export async function startFirefox(program: string, ...options: string[]): Promi
   );
   // Without a display Firefox finds no software renderer for WebGL, even if it shows no windows.
   const display = await startVirtualDisplay();
+  // Without a speaker an AudioContext never runs.
+  const speaker = await startVirtualSpeaker(folder);
   const browser = startProcess(
     program,
     ["--headless", "--no-remote", "--profile", profile, "--remote-debugging-port", "0", ...options],
-    { DISPLAY: display.name, HOME: folder, MOZ_CRASHREPORTER_DISABLE: "1" },
+    { DISPLAY: display.name, PULSE_SERVER: speaker.address, HOME: folder, MOZ_CRASHREPORTER_DISABLE: "1" },
   );
   browser.stdout?.resume();
   const url = await findInOutput(browser, browser.stderr as Readable, /WebDriver BiDi listening on (ws:\S+)/);
   const connection = await BidiConnection.open(`${url}/session`);
   await connection.send("session.new", { capabilities: {} });
   await connection.send("session.subscribe", { events: ["log.entryAdded"] });
-  return new Firefox(program, connection, browser, display, folder, downloads);
+  return new Firefox(program, connection, browser, [display, speaker], folder, downloads);
 }
 
 class Firefox implements Browser {
@@ -143,7 +145,7 @@ class Firefox implements Browser {
     private readonly program: string,
     private readonly connection: BidiConnection,
     private readonly browser: ChildProcess,
-    private readonly display: VirtualDisplay,
+    private readonly devices: (VirtualDisplay | VirtualSpeaker)[],
     private readonly folder: string,
     private readonly downloads: string,
   ) {
@@ -195,7 +197,7 @@ class Firefox implements Browser {
   async close(): Promise<void> {
     this.connection.close();
     await stopProcess(this.browser);
-    await this.display.stop();
+    await Promise.all(this.devices.map((device) => device.stop()));
     removeFolder(this.folder);
   }
 }

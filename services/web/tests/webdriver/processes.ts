@@ -1,4 +1,4 @@
-/** Processes of browsers and displays. */
+/** Processes of browsers, displays and speakers. */
 import { type ChildProcess, spawn } from "node:child_process";
 import { existsSync, rmSync } from "node:fs";
 import { createServer } from "node:net";
@@ -108,4 +108,26 @@ export async function startVirtualDisplay(): Promise<VirtualDisplay> {
   const server = startProcess("Xvfb", ["-displayfd", "3", "-screen", "0", "1024x800x24", "-nolisten", "tcp"]);
   const number = await findInOutput(server, server.stdio[3] as Readable, /^(\d+)$/);
   return { name: `:${number}`, stop: () => stopProcess(server) };
+}
+
+/** A speaker that nobody hears, whose clock runs as that of a sound card. */
+export interface VirtualSpeaker {
+  /** Value of `PULSE_SERVER`. */
+  readonly address: string;
+  stop(): Promise<void>;
+}
+
+/** Start a sound server whose files are in `folder`. */
+export async function startVirtualSpeaker(folder: string): Promise<VirtualSpeaker> {
+  const socket = join(folder, "pulse.socket");
+  const server = startProcess(
+    "pulseaudio",
+    [
+      ...["-n", "--daemonize=no", "--use-pid-file=no", "--exit-idle-time=-1", "--log-level=info"],
+      ...["-L", "module-null-sink", "-L", `module-native-protocol-unix socket=${socket} auth-cookie-enabled=0`],
+    ],
+    { HOME: folder, PULSE_RUNTIME_PATH: folder, LC_ALL: "C" },
+  );
+  await findInOutput(server, server.stderr as Readable, /(Daemon startup complete)/);
+  return { address: `unix:${socket}`, stop: () => stopProcess(server) };
 }

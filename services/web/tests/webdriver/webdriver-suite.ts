@@ -16,7 +16,7 @@ import { startWebKit } from "./webkit";
 const WINDOW_SIZE: WindowSize = { width: 600, height: 420 };
 
 const BROWSERS = {
-  Firefox: { programs: ["firefox-esr", "Xvfb"], start: startFirefox },
+  Firefox: { programs: ["firefox-esr", "Xvfb", "pulseaudio"], start: startFirefox },
   WebKitGTK: { programs: ["WebKitWebDriver", "Xvfb"], start: startWebKit },
 };
 
