@@ -6,10 +6,10 @@ import { startEngineWorker } from "./app/engine-worker";
 
 if (typeof document === "undefined") {
   // Renderer and mesh load at the same time; the engine reports it if they do not load.
-  import("./engine/stage-chunk").catch(() => undefined);
-  import("./stage/puppet/puppet-geometry").catch(() => undefined);
+  const loads = [import("./engine/stage-chunk"), import("./stage/puppet/puppet-geometry")];
+  const settled = Promise.allSettled(loads);
   // Only errors reach the page, which then runs the engine itself.
-  import("./engine/worker").then(({ serveEngine }) => serveEngine()).catch(reportError);
+  import("./engine/worker").then(({ serveEngine }) => serveEngine(settled)).catch(reportError);
 } else {
   const worker = startEngineWorker(import.meta.url, new URLSearchParams(location.search).get("engine"));
   void import("./app/start").then(({ startPage }) => startPage(worker));

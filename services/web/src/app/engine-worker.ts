@@ -9,14 +9,14 @@ export async function startEngineWorker(script: string, realm: string | null): P
   if (realm === "page" || typeof Worker === "undefined") return null;
   if (!("transferControlToOffscreen" in HTMLCanvasElement.prototype)) return null;
   const worker = new Worker(script, { type: "module", name: "engine" });
-  const isSupported = await new Promise<boolean>((resolve) => {
-    worker.onmessage = ({ data }: MessageEvent<EngineHello>) => resolve(data.isSupported);
+  const hello = await new Promise<EngineHello | null>((resolve) => {
+    worker.onmessage = ({ data }: MessageEvent<EngineHello>) => resolve(data);
     worker.onerror = (event) => {
       event.preventDefault();
-      resolve(false);
+      resolve(null);
     };
   });
-  if (isSupported) return worker;
-  worker.terminate();
-  return null;
+  // A worker that cannot draw closes itself.
+  if (hello === null) worker.terminate();
+  return hello?.isSupported ? worker : null;
 }

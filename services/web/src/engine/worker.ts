@@ -17,8 +17,11 @@ export interface EngineHello {
   readonly isSupported: boolean;
 }
 
-/** Run the engine of the page that has started this worker. */
-export function serveEngine(): void {
+/**
+ * Run the engine of the page that has started this worker. Where it cannot draw, close the worker after `loads`:
+ * Firefox reports modules whose evaluation the end of a worker interrupts as errors of the page.
+ */
+export function serveEngine(loads: Promise<unknown>): void {
   const driver = findDriver();
   /** Resolves with the engine once the first message has started it. */
   let engine: Promise<Engine> | null = null;
@@ -32,6 +35,7 @@ export function serveEngine(): void {
     reportError(event.reason);
   });
   self.postMessage({ type: "hello", isSupported: driver !== null } satisfies EngineHello);
+  if (driver === null) void loads.then(() => self.close());
 }
 
 async function start({ canvas, options }: EngineStart, driver?: string): Promise<Engine> {

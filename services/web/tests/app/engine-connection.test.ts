@@ -97,13 +97,13 @@ test("responses reach their requests", async () => {
 });
 
 test.for([
-  ["cannot draw", { type: "hello", isSupported: false }],
-  ["does not load", null],
-] as const)("the engine runs in the page if the worker %s", async ([, first]) => {
+  ["cannot draw, and closes itself", { type: "hello", isSupported: false }, false],
+  ["does not load", null, true],
+] as const)("the engine runs in the page if the worker %s", async ([, first, isTerminated]) => {
   FakeWorker.first = first;
   connection.post(toggleCamera);
   await connection.start(await startEngineWorker("main.js", null));
-  expect([FakeWorker.started[0].isTerminated, transferred]).toEqual([true, 0]);
+  expect([FakeWorker.started[0].isTerminated, transferred]).toEqual([isTerminated, 0]);
   // This page has no graphics either: its engine says so.
   await expect.poll(() => events.map(({ type }) => type)).toContain("unavailable");
 });
