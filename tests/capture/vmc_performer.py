@@ -17,8 +17,7 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 from bunraku.motion import rotation
 from bunraku.motion.analysis import SourceFit, fit_source
 from bunraku.motion.bvh import Bvh, parse_bvh
-from bunraku.motion.bvh_kinematics import ancestor_chain
-from bunraku.motion.name_mapping import common_ancestor
+from bunraku.motion.joint_tree import ancestor_chain, common_ancestor
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, Motion
 from bunraku.motion.unity_axes import mirror_rotations, mirror_vectors, to_xyzw
@@ -148,11 +147,11 @@ def _t_pose_to_rest(source: SourceFit, bone: str, joints: dict[str, int]) -> Arr
 
 
 def _path(bvh: Bvh, above: int, below: int) -> list[int]:
-    chain = ancestor_chain(bvh, below)
+    chain = ancestor_chain(bvh.parents, below)
     return chain[: chain.index(above) + 1][::-1]
 
 
 def _parent_index(bvh: Bvh, sources: list[int], index: int) -> int:
     """Return the bone whose joint is the nearest ancestor, -1 for the hips."""
-    above = ancestor_chain(bvh, sources[index])[1:]
+    above = ancestor_chain(bvh.parents, sources[index])[1:]
     return next((sources.index(joint) for joint in above if joint in sources), -1)

@@ -86,7 +86,7 @@ def test_unexplained_size_is_scaled_and_reported() -> None:
     assert analysis.unit == "unknown"
     offsets = analysis.motion.figure.offsets
     assert -offsets[JOINT_INDEX["l_knee"], 1] - offsets[JOINT_INDEX["l_ankle"], 1] == pytest.approx(0.82, abs=1e-6)
-    assert any("fits no unit" in sentence for sentence in analysis.assumptions)
+    assert any("units was scaled to 0.82 m" in sentence for sentence in analysis.assumptions)
 
 
 @pytest.mark.parametrize("swing", [0.3, 0.6])
@@ -233,3 +233,54 @@ def test_straight_figure_has_straight_limbs() -> None:
     assert joint_and_tip_positions(figure, figure.offsets[0], np.tile(rotation.IDENTITY, (18, 1)))[
         :, 1
     ].min() == pytest.approx(0.0)
+
+
+def far_away(source: bvh.Bvh, distance: float, frame: int = 0) -> bvh.Bvh:
+    """Return `source` with the root `distance` farther along x, in the file's units, from `frame` on."""
+    frames = source.frames.copy()
+    frames[frame:, source.channels[0].index("Xposition")] += distance
+    return replace(source, frames=frames)
+
+
+def test_dance_far_away_is_moved_to_the_stage() -> None:
+    source = bvh.parse_bvh(export_bvh(smooth_motion()))
+    near, far = analyse(source), analyse(far_away(source, 1e6))
+    assert np.abs(far.motion.root[:, [0, 2]]).max() < 10.0
+    assert np.ptp(far.motion.root - near.motion.root, axis=0) == pytest.approx(0.0, abs=1e-6)
+    assert any("from the middle of the stage" in sentence for sentence in far.assumptions)
+
+
+@pytest.mark.parametrize(("distance", "frame", "said"), [(1e7, 1, "in frame 1 the body is"), (1e30, 0, "the origin")])
+def test_broken_positions_are_refused(distance: float, frame: int, said: str) -> None:
+    source = bvh.parse_bvh(export_bvh(smooth_motion()))
+    with pytest.raises(UnreadableMotion, match=said) as caught:
+        analyse(far_away(source, distance, frame))
+    assert (caught.value.title, caught.value.field) == ("Leaves the stage", source.names[0])
+
+
+def test_poor_fit_is_said() -> None:
+    source = bvh.parse_bvh(export_bvh(smooth_motion()))
+    assert not any("poor" in sentence for sentence in analyse(source).assumptions)
+    # a spine that slides by half a metre, which no figure can follow
+    spine = JOINT_INDEX["vl5"]
+    channels = tuple(
+        ("Xposition", "Yposition", "Zposition", *given) if joint == spine else given
+        for joint, given in enumerate(source.channels)
+    )
+    column = sum(len(given) for given in source.channels[:spine])
+    slides = 50.0 * np.sin(np.arange(len(source.frames)))[:, None] * [1.0, 0.0, 0.0] + source.offsets[spine]
+    frames = np.concatenate([source.frames[:, :column], slides, source.frames[:, column:]], axis=1)
+    torn = analyse(replace(source, channels=channels, frames=frames))
+    assert torn.mean_fit_error_mm > 25.0
+    assert any("The fit is poor" in sentence for sentence in torn.assumptions)
+
+
+def test_scale_channels_are_skipped() -> None:
+    source = bvh.parse_bvh(export_bvh(smooth_motion()))
+    count = len(source.channels[0])
+    scaled = replace(
+        source,
+        channels=((*source.channels[0], "Xscale", "Yscale", "Zscale"), *source.channels[1:]),
+        frames=np.insert(source.frames, [count] * 3, 7.0, axis=1),
+    )
+    assert_motions_equal(analyse(scaled).motion, analyse(source).motion)

@@ -52,13 +52,25 @@ def test_duplicate_sibling_names_are_noted() -> None:
     assert hierarchy.notes == ("Several joints have the same name: Spine.",)
 
 
+def test_joint_may_be_named_as_its_parent() -> None:
+    hierarchy = parse_hierarchy(HIERARCHY_WITH_MOTION.replace(b"JOINT Spine", b"JOINT Hips"))
+    assert (hierarchy.names, hierarchy.parents) == (("Hips", "Hips"), (-1, 0))
+    assert hierarchy.notes == ("Several joints have the same name: Hips.",)
+
+
+def test_scale_channels_are_read() -> None:
+    given = b"CHANNELS 3 Zrotation"
+    scaled = HIERARCHY_WITH_MOTION.replace(given, b"CHANNELS 6 Xscale Yscale Zscale Zrotation")
+    assert given in HIERARCHY_WITH_MOTION
+    assert parse_hierarchy(scaled).channels[1][:4] == ("Xscale", "Yscale", "Zscale", "Zrotation")
+
+
 @pytest.mark.parametrize(
     ("old", "new", "title", "line", "field"),
     [
         (b"HIERARCHY", b"<?xml", "Not a BVH file", 1, None),
         (b"JOINT Spine", b"ROOT Spine", "Two roots", 6, "Spine"),
         (b"}\nMOTION", b"}\nROOT b\n{\n}\nMOTION", "Two roots", 16, "b"),
-        (b"JOINT Spine", b"JOINT Hips", "Cycle of joints", 6, "Hips"),
         (b"}\nMOTION", b"}\n}\nMOTION", "Unbalanced braces", 16, None),
         (b"  }\n}\nMOTION", b"  }\nMOTION", "Unbalanced braces", 15, "Hips"),
         (b"  }\n}\nMOTION", b"  }\n}\nJOINT b\n{\n}\nMOTION", "Joint in the wrong place", 16, "b"),

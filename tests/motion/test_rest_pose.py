@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from bunraku.motion import bvh, rotation
 from bunraku.motion.bvh_kinematics import forward_kinematics
+from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rest_pose import METRES_PER_UNIT, RestPose, find_rest_pose, resolve_sides, sample_frames
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Motion
@@ -113,19 +114,30 @@ def sampled_positions(motion: Motion) -> Array:
     return forward_kinematics(source, list(range(18)), sample_frames(source))[0]
 
 
+@pytest.mark.parametrize("profile", ["VRM", SHAPE_PROFILE])
 @pytest.mark.parametrize("crossed", [("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle", "midtarsal")])
-def test_crossed_arms_and_legs_are_put_on_one_side(crossed: tuple[str, ...]) -> None:
+def test_crossed_arms_and_legs_are_put_on_one_side(crossed: tuple[str, ...], profile: str) -> None:
     joints = dict(JOINTS_BY_NAME)
     for name in crossed:
         joints[f"l_{name}"], joints[f"r_{name}"] = joints[f"r_{name}"], joints[f"l_{name}"]
-    found, said = resolve_sides(sampled_positions(smooth_motion(frames=20)), joints)
+    found, said = resolve_sides(sampled_positions(smooth_motion(frames=20)), JointMapping(profile, joints))
     assert found == JOINTS_BY_NAME
     assert said
 
 
+def test_named_sides_stay_without_the_evidence_of_feet() -> None:
+    position = sampled_positions(smooth_motion(frames=20))
+    other = {"l_": "r_", "r_": "l_"}
+    swapped = {other.get(name[:2], name[:2]) + name[2:]: at for name, at in JOINTS_BY_NAME.items()}
+    footless = {name: at for name, at in swapped.items() if not name.endswith(("midtarsal", "ankle"))}
+    assert resolve_sides(position, JointMapping("VRM", footless)) == (footless, [])
+    found, said = resolve_sides(position, JointMapping("VRM", swapped))
+    assert (found, len(said)) == (JOINTS_BY_NAME, 1)
+
+
 def test_correct_sides_stay_and_the_input_is_unchanged() -> None:
     given = dict(JOINTS_BY_NAME)
-    found, said = resolve_sides(sampled_positions(smooth_motion(frames=20)), given)
+    found, said = resolve_sides(sampled_positions(smooth_motion(frames=20)), JointMapping("VRM", given))
     assert (found, said, given) == (JOINTS_BY_NAME, [], JOINTS_BY_NAME)
 
 

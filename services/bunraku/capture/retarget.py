@@ -27,8 +27,8 @@ from bunraku.marionette.solver.vector import (
     subtract,
 )
 from bunraku.motion import rotation
-from bunraku.motion.bvh_kinematics import ancestor_chain
 from bunraku.motion.joint_rule import MIN_AIM_DISTANCE_M, JointRule
+from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, PARENTS
 
@@ -75,7 +75,7 @@ class Retargeter:
             {
                 ancestor
                 for joint in _list_sources(fit.rules) | {fit.joints[0]}
-                for ancestor in ancestor_chain(fit.bvh, joint)
+                for ancestor in ancestor_chain(fit.bvh.parents, joint)
             }
         )
         index = {joint: number for number, joint in enumerate(used)}
@@ -88,7 +88,7 @@ class Retargeter:
         )
         self._root = index[fit.joints[0]]
         self._scale = rest.scale
-        self._lowered = calibration.fit.lowered
+        self._moved = calibration.fit.moved
         self._to_figure = _as_quaternion(rest.motion_to_figure)
         self._rules = [
             _make_frame_rule(joint, fit.rules[joint], fit.offsets[joint] / rest.scale, fit.rest_orientations, index)
@@ -123,7 +123,7 @@ class Retargeter:
             above = conjugate(orientations[parent]) if parent >= 0 else self._to_figure
             local.append(multiply(above, orientation))
         x, y, z = scale(rotate(self._to_figure, positions[0]), self._scale)
-        return Pose(np.array((x, y - self._lowered, z)), np.array(local), frame.blendshapes)
+        return Pose(np.array((x, y, z)) + self._moved, np.array(local), frame.blendshapes)
 
     def _aim(self, orientation: Quaternion, bone: Vector, there: Vector) -> Quaternion:
         """Return `orientation` with the smallest rotation that brings the direction of `bone` to that of `there`."""

@@ -9,10 +9,14 @@ import numpy as np
 from bunraku.motion import rotation
 from bunraku.motion.bvh import Bvh
 from bunraku.motion.bvh_kinematics import forward_kinematics
+from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.fit import FigureFit
+from bunraku.motion.joint_tree import common_ancestor
 from bunraku.motion.limb_fit import fit_arm, fit_leg
-from bunraku.motion.name_mapping import common_ancestor, map_by_name
+from bunraku.motion.name_mapping import SHAPE_PROFILE, find_head_by_name, map_by_name
+from bunraku.motion.placement import MAX_STAGE_DISTANCE_M
 from bunraku.motion.rest_pose import RestPose, find_rest_pose, resolve_sides, sample_frames
+from bunraku.motion.rotation import Array
 from bunraku.motion.shape_mapping import find_head, map_by_shape
 from bunraku.motion.skeleton import (
     JOINT_COUNT,
@@ -24,8 +28,12 @@ from bunraku.motion.skeleton import (
 )
 from bunraku.motion.trunk_fit import fit_trunk
 
+MAX_TRAVEL_M, MAX_DISTANCE_M = 1e3, 1e9
+"""Farthest that a motion may lead from where it mostly is, and from the origin: beyond them there is a broken value."""
 FLOOR_TOLERANCE_M = 0.5
 """The height is kept if the lowest point of the feet is within this distance of the floor."""
+POOR_FIT_MM = 25.0
+"""Mean distance of joints above which the fit is said to be poor; those of recorded people are below 10 mm."""
 CALIBRATION_POSE_LIMITS = (0.05, 4.0)
 """The first frame is a calibration pose if its mean joint distance to the second exceeds the first limit, in metres,
 and exceeds the largest later step by the second limit, a factor."""
@@ -55,13 +63,13 @@ class Analysis:
 class SourceFit:
     """Fit of a figure to a source: the state of the fit, and the rest pose and naming convention that led to it.
 
-    `lowered` is the height in metres that was subtracted from all positions, because the source was off the floor.
+    `moved` (3,) was added to all positions, in metres, because the source was off the floor or far from the stage.
     """
 
     fit: FigureFit
     rest: RestPose
     profile: str
-    lowered: float
+    moved: Array
     assumptions: list[str]
 
     def build_figure(self) -> Figure:
@@ -86,6 +94,11 @@ def analyse(bvh: Bvh) -> Analysis:
     placed, _ = world_transforms(motion.figure, motion.root, motion.rotations)
     mapped = sorted(fit.joints)
     apart = 1000.0 * np.linalg.norm(placed[:, mapped] - fit.position[:, [fit.joints[j] for j in mapped]], axis=-1)
+    if apart.mean() > POOR_FIT_MM:
+        source.assumptions.append(
+            f"The fit is poor: the figure's joints are {apart.mean():.0f} mm from the source's on average. "
+            "The source may not have the body of a human."
+        )
     return Analysis(
         motion=motion,
         profile=source.profile,
@@ -101,24 +114,27 @@ def analyse(bvh: Bvh) -> Analysis:
 def fit_source(bvh: Bvh) -> SourceFit:
     """Fit a figure and the rules of its joints to all frames of `bvh`; raise `UnreadableMotion` as `analyse` does."""
     naming = map_by_name(bvh.names, bvh.parents) or map_by_shape(bvh)
-    guessed = [*bvh.notes, *naming.assumptions]
+    guessed = [*bvh.notes]
     frames = sample_frames(bvh)
     position, orientation = forward_kinematics(bvh, list(range(len(bvh.names))), frames)
-    joints, exchanged = resolve_sides(position, naming.joints)
+    joints, exchanged = resolve_sides(position, naming)
     guessed += exchanged
     joints = _complete_mapping(bvh, joints, guessed)
+    if naming.profile == SHAPE_PROFILE:
+        pairs = ", ".join(f"{joint} = {bvh.names[source]}" for joint, source in sorted(joints.items()))
+        guessed.append(f"No naming convention matches; the skeleton's shape gave {pairs}.")
     rest = find_rest_pose(bvh, joints, frames, position, orientation)
     guessed += rest.assumptions
     fit = FigureFit.from_bvh(bvh, joints, rest)
     if _starts_with_calibration_pose(fit):
         guessed.append("The first frame is a pose apart from the dance; it was left out.")
         fit = fit.without_first_frame()
-    lowered = _move_to_floor(fit, guessed)
+    moved = _move_to_stage(fit, guessed)
     fit_trunk(fit)
     for side in "lr":
         fit_leg(fit, side)
         fit_arm(fit, side)
-    return SourceFit(fit, rest, naming.profile, lowered, guessed)
+    return SourceFit(fit, rest, naming.profile, moved, guessed)
 
 
 def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:
@@ -129,9 +145,12 @@ def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) 
     """
     joints = dict(joints)
     hips = [joints["l_hip"], joints["r_hip"]]
-    if "skullbase" not in joints and (head := find_head(bvh, joints)) is not None:
-        joints["skullbase"] = head
-        assumptions.append(f"No joint is named as the head; {bvh.names[head]} was taken for it.")
+    if "skullbase" not in joints:
+        head = find_head_by_name(bvh.names, bvh.parents, joints)
+        if head is None and (head := find_head(bvh, joints)) is not None:
+            assumptions.append(f"No joint is named as the head; {bvh.names[head]} was taken for it.")
+        if head is not None:
+            joints["skullbase"] = head
     root = common_ancestor(bvh.parents, [*hips, joints["l_shoulder"], joints["r_shoulder"]])
     pelvis = common_ancestor(bvh.parents, hips)
     joints["humanoid_root"] = root
@@ -154,12 +173,38 @@ def _starts_with_calibration_pose(fit: FigureFit) -> bool:
     return bool(step[0] > CALIBRATION_POSE_LIMITS[0] and step[0] > CALIBRATION_POSE_LIMITS[1] * step[1:].max())
 
 
-def _move_to_floor(fit: FigureFit, assumptions: list[str]) -> float:
-    """Lower the source if its feet are far from the floor; return by how much, in metres."""
+def _move_to_stage(fit: FigureFit, assumptions: list[str]) -> Array:
+    """Move the source if its feet are far from the floor or its middle from the stage; return by how much (3,), metres.
+
+    Raises `UnreadableMotion` if the motion leads too far away.
+    """
+    moved = np.zeros(3)
     feet = [source for joint, source in fit.joints.items() if JOINTS[joint][2:] in ("ankle", "midtarsal")]
     lowest = float(fit.position[:, feet or list(fit.joints.values()), 1].min())
-    if abs(lowest) <= FLOOR_TOLERANCE_M:
-        return 0.0
-    assumptions.append(f"The lowest point of the feet was {lowest:.2f} m from the floor; the dance was moved onto it.")
-    fit.position[..., 1] -= lowest
-    return lowest
+    root = fit.position[:, fit.joints[0]]
+    middle = np.median(root, axis=0)
+    for start, limit, name in (
+        (np.zeros(3), MAX_DISTANCE_M, "the origin"),
+        (middle, MAX_TRAVEL_M, "where it mostly is"),
+    ):
+        apart = np.abs(root - start).max(axis=-1)
+        if not apart.max() <= limit:
+            frame = int(apart.argmax())
+            raise UnreadableMotion(
+                "Leaves the stage",
+                f"in frame {frame + 1} the body is {apart[frame]:.3g} m from {name}",
+                field=fit.bvh.names[fit.joints[0]],
+                hint=f"correct the positions of the root: at most {limit:.0g} m can be read",
+            )
+    if abs(lowest) > FLOOR_TOLERANCE_M:
+        assumptions.append(
+            f"The lowest point of the feet was {lowest:.2f} m from the floor; the dance was moved onto it."
+        )
+        moved[1] = -lowest
+    if np.hypot(middle[0], middle[2]) > MAX_STAGE_DISTANCE_M:
+        assumptions.append(
+            f"The dance was {np.hypot(middle[0], middle[2]):.3g} m from the middle of the stage; it was moved there."
+        )
+        moved[[0, 2]] = -middle[[0, 2]]
+    fit.position += moved
+    return moved

@@ -17,7 +17,9 @@ MAX_DEPTH = 256
 MAX_NAME_BYTES = 200
 AXES = "xyz"
 ORIGIN = (0.0, 0.0, 0.0)
-CHANNEL_NAMES = {f"{axis}{kind}": f"{axis.upper()}{kind}" for kind in ("position", "rotation") for axis in AXES}
+CHANNEL_NAMES = {
+    f"{axis}{kind}": f"{axis.upper()}{kind}" for kind in ("position", "rotation", "scale") for axis in AXES
+}
 
 _SEPARATOR = re.compile(rb"(?:\s++|(?:#|//)[^\n]*+)*+")
 _WORD = re.compile(rb"[{}]|[^\s{}]+")
@@ -219,17 +221,6 @@ def _open_joint(builder: _HierarchyBuilder, tokens: _Tokenizer, parent: int) -> 
             "Too deep", f"joints nested over {MAX_DEPTH} deep", line=line, hint="a } may be missing above"
         )
     name = tokens.next_name() or f"joint {len(builder.names)}".encode()
-    ancestor: int = parent
-    while ancestor >= 0:
-        if builder.names[ancestor] == name:
-            raise UnreadableMotion(
-                "Cycle of joints",
-                f"{quote_excerpt(name)} lies inside itself (see line {builder.joint_lines[ancestor]})",
-                line=line,
-                field=_decode_names([name])[0],
-                hint="a joint cannot be its own ancestor; rename it or check the braces",
-            )
-        ancestor = builder.parents[ancestor]
     _expect_open_brace(tokens, name)
     builder.stack.append(len(builder.names))
     builder.names.append(name)

@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from bunraku.motion import rotation
 from bunraku.motion.bvh import Bvh
+from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rotation import Array
 
 
@@ -25,15 +26,6 @@ def rest_positions(bvh: Bvh) -> Array:
     return position
 
 
-def ancestor_chain(bvh: Bvh, joint: int) -> list[int]:
-    """Return `joint` and its ancestors up to the root."""
-    chain = []
-    while joint >= 0:
-        chain.append(joint)
-        joint = bvh.parents[joint]
-    return chain
-
-
 def forward_kinematics(bvh: Bvh, joints: list[int], frames: npt.NDArray[np.int64] | None = None) -> tuple[Array, Array]:
     """Return world positions (n, J, 3) and orientations (n, J, 4) of `joints` and their ancestors; others stay zero.
 
@@ -45,7 +37,7 @@ def forward_kinematics(bvh: Bvh, joints: list[int], frames: npt.NDArray[np.int64
     position = np.zeros((len(values), len(bvh.names), 3))
     orientation = np.zeros((len(values), len(bvh.names), 4))
     column = channel_columns(bvh)
-    used = {ancestor for joint in joints for ancestor in ancestor_chain(bvh, joint)}
+    used = {ancestor for joint in joints for ancestor in ancestor_chain(bvh.parents, joint)}
     for joint in sorted(used):
         parent = bvh.parents[joint]
         local, offset = _local_transform(bvh, joint, values, column[joint])
@@ -68,7 +60,7 @@ def _local_transform(bvh: Bvh, joint: int, values: Array, column: int) -> tuple[
         axis = "XYZ".index(channel[0])
         if channel.endswith("rotation"):
             turned = rotation.multiply(turned, rotation.from_coordinate_axis(axis, np.radians(track)))
-        else:
+        elif channel.endswith("position"):
             moved[:, axis] = track
     given = ["XYZ".index(c[0]) for c in bvh.channels[joint] if c.endswith("position")]
     if given and bvh.parents[joint] >= 0:

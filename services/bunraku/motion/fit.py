@@ -8,8 +8,9 @@ import numpy as np
 
 from bunraku.motion import procrustes, rotation
 from bunraku.motion.bvh import Bvh
-from bunraku.motion.bvh_kinematics import ancestor_chain, forward_kinematics
+from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.joint_rule import JointRule, aim_at
+from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rest_pose import RestPose
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS
@@ -48,7 +49,7 @@ class FigureFit:
     def from_bvh(cls, bvh: Bvh, joints: dict[str, int], rest: RestPose) -> FigureFit:
         """Return the whole clip of `bvh` in the figure's axes, with no joint placed yet."""
         index = {JOINT_INDEX[name]: source for name, source in joints.items()}
-        used = sorted({ancestor for source in index.values() for ancestor in ancestor_chain(bvh, source)})
+        used = sorted({ancestor for source in index.values() for ancestor in ancestor_chain(bvh.parents, source)})
         position, orientation = forward_kinematics(bvh, used)
         axes = rotation.multiply(rest.rest_to_figure, rest.orientations)
         turn = np.zeros_like(orientation)
@@ -122,7 +123,9 @@ class FigureFit:
 
     def farthest_descendant(self, source: int) -> Array | None:
         """Return the vector (3,) from a source joint to its farthest descendant at rest; None if it has none."""
-        below = [joint for joint in range(source, len(self.bvh.parents)) if source in ancestor_chain(self.bvh, joint)]
+        below = [
+            joint for joint in range(source, len(self.bvh.parents)) if source in ancestor_chain(self.bvh.parents, joint)
+        ]
         found = [self.rest_positions[joint] - self.rest_positions[source] for joint in below[1:]]
         found += [
             self.rest_positions[end.parent]

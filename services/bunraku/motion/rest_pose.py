@@ -14,6 +14,7 @@ import numpy as np
 from bunraku.motion import rotation
 from bunraku.motion.bvh import Bvh
 from bunraku.motion.bvh_kinematics import rest_positions
+from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
 
 REFERENCE_LEG_M = 0.82
@@ -52,17 +53,19 @@ def sample_frames(bvh: Bvh) -> np.ndarray:
     return np.unique(np.linspace(0, len(bvh.frames) - 1, MAX_SAMPLED_FRAMES).astype(np.int64))
 
 
-def resolve_sides(position: Array, joints: dict[str, int]) -> tuple[dict[str, int], list[str]]:
-    """Return `joints` with left and right as the body's front shows them, and sentences about changes.
+def resolve_sides(position: Array, mapping: JointMapping) -> tuple[dict[str, int], list[str]]:
+    """Return the joints of `mapping` with left and right as the body's front shows them, and sentences about changes.
 
     `position` (n, J, 3) are sampled frames. Toes point forwards and knees bend forwards; arms are above the legs of the
-    same side.
+    same side. Names are contradicted only by strong evidence, that of whole feet.
     """
-    joints = dict(joints)
+    joints = dict(mapping.joints)
+    has_names = mapping.profile != SHAPE_PROFILE
     notes = []
     across = position[:, joints["l_hip"]] - position[:, joints["r_hip"]]
     shoulders = position[:, joints["l_shoulder"]] - position[:, joints["r_shoulder"]]
-    if np.mean(np.sum(rotation.normalise(across) * rotation.normalise(shoulders), axis=-1)) < -0.3:
+    alignment = float(np.mean(np.sum(rotation.normalise(across) * rotation.normalise(shoulders), axis=-1)))
+    if alignment < (-0.7 if has_names else -0.3):
         _swap_sides(joints, ("shoulder", "elbow", "wrist"))
         notes.append("Left and right arm were exchanged: they are over the other leg.")
     up = _body_up(position, joints)
@@ -77,7 +80,8 @@ def resolve_sides(position: Array, joints: dict[str, int]) -> tuple[dict[str, in
         if f"{side}_midtarsal" in joints:
             foot = position[:, joints[f"{side}_midtarsal"]] - ankle
             shown += float(np.median(np.sum(foot * forward, axis=-1))) / size
-    if shown < -0.1:
+    has_feet = {f"{side}_{joint}" for side in "lr" for joint in ("ankle", "midtarsal")} <= joints.keys()
+    if shown < (-0.1 if not has_names else -0.4 if has_feet else -np.inf):
         _swap_sides(joints, ("hip", "knee", "ankle", "midtarsal", "shoulder", "elbow", "wrist"))
         notes.append("Left and right were exchanged: toes and knees point the other way.")
     return joints, notes
@@ -159,11 +163,9 @@ def _detect_unit(position: Array, joints: dict[str, int], assumptions: list[str]
     )
     name = min(METRES_PER_UNIT, key=lambda unit: abs(np.log(max(leg, 1e-12) * METRES_PER_UNIT[unit] / REFERENCE_LEG_M)))
     if abs(np.log(max(leg, 1e-12) * METRES_PER_UNIT[name] / REFERENCE_LEG_M)) > MAX_LEG_LOG_RATIO:
-        assumptions.append(
-            f"A leg of {leg:.4g} units fits no unit of length; the figure was given a leg of {REFERENCE_LEG_M} m."
-        )
+        assumptions.append(f"The unit is unknown: a leg of {leg:.4g} units was scaled to {REFERENCE_LEG_M} m.")
         return "unknown", REFERENCE_LEG_M / max(leg, 1e-12)
-    assumptions.append(f"The unit is {name}: a leg of {leg * METRES_PER_UNIT[name]:.2f} m.")
+    assumptions.append(f"The unit is {name}: a leg of {leg:.4g} units is {leg * METRES_PER_UNIT[name]:.2f} m.")
     return name, METRES_PER_UNIT[name]
 
 

@@ -13,15 +13,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.motion.bvh import Bvh
-from bunraku.motion.bvh_kinematics import ancestor_chain
 from bunraku.motion.errors import UnreadableMotion
-from bunraku.motion.name_mapping import JointMapping, common_ancestor, is_descendant
+from bunraku.motion.joint_tree import ancestor_chain, common_ancestor, is_descendant
+from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
 
 MAX_LENGTH_DIFFERENCE = 0.15
 """Largest difference of left and right bones, as a share of the longer."""
-MIN_LIMB_RATIO = 0.15
-"""Smallest limb, as a share of the longest path from the root to a joint."""
+MIN_LIMB_RATIO = 0.2
+"""Smallest limb, as a share of the longest one: how far the root is away does not matter."""
+MAX_SHORT_RATIO = 0.01
+"""Bones shorter than this share of the median have no length: two joints at one place."""
 MAX_FOREARM_RATIO = 0.8
 """Collar bone and upper arm count as an arm only if upper arm and forearm are shorter than this share of them."""
 MIN_HEAD_RATIO = 0.12
@@ -67,11 +69,7 @@ def map_by_shape(bvh: Bvh) -> JointMapping:
         toes = _longest_branch(bvh, lengths, leg.joints[2], set())
         if toes and lengths[toes[0]] > 0.05 * leg.length:
             joints[f"{side}_midtarsal"] = toes[0]
-    head = find_head(bvh, joints)
-    if head is not None:
-        joints["skullbase"] = head
-    names = ", ".join(f"{joint} = {bvh.names[source]}" for joint, source in sorted(joints.items()))
-    return JointMapping("shape", joints, [f"No naming convention matches; the skeleton's shape gave {names}."])
+    return JointMapping(SHAPE_PROFILE, joints)
 
 
 def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
@@ -81,7 +79,7 @@ def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
     legs = [joints["l_hip"], joints["r_hip"]]
     leg = lengths[joints["l_knee"]] + lengths[joints.get("l_ankle", joints["l_knee"])]
     chest = common_ancestor(bvh.parents, arms)
-    excluded = {joint for limb in arms + legs for joint in ancestor_chain(bvh, limb)}
+    excluded = {joint for limb in arms + legs for joint in ancestor_chain(bvh.parents, limb)}
     excluded.discard(chest)
     branch = _longest_branch(bvh, lengths, chest, excluded)
     above = 0.0
@@ -96,20 +94,17 @@ def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
 
 def _find_limb_pairs(bvh: Bvh, lengths: Array) -> list[tuple[_LimbCandidate, _LimbCandidate]]:
     """Return pairs of limbs that are alike and disjoint, longest first."""
-    depth = np.zeros(len(lengths))
-    for joint, parent in enumerate(bvh.parents):
-        if parent >= 0:
-            depth[joint] = depth[parent] + lengths[joint]
-    limbs = [limb for limb in _find_limbs(bvh, lengths) if limb.length > MIN_LIMB_RATIO * depth.max()]
+    limbs = sorted(_find_limbs(bvh, lengths), key=lambda limb: -limb.length)[:60]
     found = [
         (a, b)
-        for a, b in itertools.combinations(sorted(limbs, key=lambda limb: -limb.length)[:60], 2)
+        for a, b in itertools.combinations(limbs, 2)
         if all(
             abs(x - y) <= MAX_LENGTH_DIFFERENCE * max(x, y) for x, y in zip(a.bone_lengths, b.bone_lengths, strict=True)
         )
         and _are_disjoint(a, b, bvh.parents)
     ]
-    return sorted(found, key=lambda pair: -min(pair[0].length, pair[1].length))
+    found.sort(key=lambda pair: -min(pair[0].length, pair[1].length))
+    return [pair for pair in found if pair[1].length > MIN_LIMB_RATIO * found[0][0].length]
 
 
 def _skip_collar_bones(
@@ -125,7 +120,7 @@ def _skip_collar_bones(
 
 def _find_limbs(bvh: Bvh, lengths: Array) -> list[_LimbCandidate]:
     """Return all pairs of consecutive bones, neither over twice the other; zero-length joints between are skipped."""
-    short = 1e-3 * max(float(lengths.max()), 1e-12)
+    short = MAX_SHORT_RATIO * float(np.median(lengths[lengths > 0.0])) if lengths.any() else 0.0
     found = []
     for end, middle in enumerate(bvh.parents):
         if middle < 0 or lengths[end] <= short:

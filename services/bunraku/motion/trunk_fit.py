@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bunraku.motion import procrustes, rotation
-from bunraku.motion.bvh_kinematics import ancestor_chain
 from bunraku.motion.fit import FigureFit
 from bunraku.motion.joint_rule import Aim, JointRule, NearestPoints
-from bunraku.motion.name_mapping import common_ancestor
+from bunraku.motion.joint_tree import ancestor_chain, common_ancestor
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX
 
@@ -70,9 +69,9 @@ def _fit_chest(fit: FigureFit) -> None:
     sources = [fit.joints[joint] for joint in carried]
     weights = CHEST_POINT_WEIGHTS[-len(carried) :]
     root = fit.joints[0]
-    above = ancestor_chain(fit.bvh, root)
+    above = ancestor_chain(fit.bvh.parents, root)
     shoulder_chain = ancestor_chain(
-        fit.bvh, common_ancestor(fit.bvh.parents, [fit.joints[JOINT_INDEX[name]] for name in SHOULDERS])
+        fit.bvh.parents, common_ancestor(fit.bvh.parents, [fit.joints[JOINT_INDEX[name]] for name in SHOULDERS])
     )
     spine = [joint for joint in reversed(shoulder_chain) if joint not in above] or [root]
     chosen = _select_chest(fit, spine, sources, weights)
