@@ -20,6 +20,7 @@ from bunraku.motion.bvh import Bvh, parse_bvh
 from bunraku.motion.joint_tree import ancestor_chain, common_ancestor
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, Motion
+from bunraku.motion.source_motion import SourceMotion
 from bunraku.motion.unity_axes import mirror_rotations, mirror_vectors, to_xyzw
 from tests.motion.synthetic_motion import export_bvh, pose_with_arms
 
@@ -61,7 +62,7 @@ def perform(bvh: Bvh) -> Performance:
     sources = list(joints.values())
     to_rest = np.stack([_t_pose_to_rest(source, bone, joints) for bone in bones])
     world = rotation.multiply(fit.turn[:, sources], to_rest)
-    parents = [_parent_index(fit.bvh, sources, index) for index in range(len(bones))]
+    parents = [_parent_index(fit.source, sources, index) for index in range(len(bones))]
     positions, rotations = fit.position[:, sources].copy(), world.copy()
     for index, parent in enumerate(parents):
         if parent >= 0:
@@ -80,7 +81,7 @@ def perform_motion(motion: Motion) -> Performance:
 
 def assign_bones(source: SourceFit) -> dict[str, int]:
     """Return the source joint of each bone, parents before children."""
-    fit, bvh = source.fit, source.fit.bvh
+    fit, bvh = source.fit, source.fit.source
     root = fit.joints[0]
     shoulders = [fit.joints[JOINT_INDEX[name]] for name in ("l_shoulder", "r_shoulder")]
     chest = common_ancestor(bvh.parents, shoulders)
@@ -146,12 +147,12 @@ def _t_pose_to_rest(source: SourceFit, bone: str, joints: dict[str, int]) -> Arr
     return rotation.IDENTITY
 
 
-def _path(bvh: Bvh, above: int, below: int) -> list[int]:
-    chain = ancestor_chain(bvh.parents, below)
+def _path(source: SourceMotion, above: int, below: int) -> list[int]:
+    chain = ancestor_chain(source.parents, below)
     return chain[: chain.index(above) + 1][::-1]
 
 
-def _parent_index(bvh: Bvh, sources: list[int], index: int) -> int:
+def _parent_index(source: SourceMotion, sources: list[int], index: int) -> int:
     """Return the bone whose joint is the nearest ancestor, -1 for the hips."""
-    above = ancestor_chain(bvh.parents, sources[index])[1:]
+    above = ancestor_chain(source.parents, sources[index])[1:]
     return next((sources.index(joint) for joint in above if joint in sources), -1)

@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 
 from bunraku.motion import bvh, rotation
 from bunraku.motion.analysis import Analysis, analyse
-from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.rotation import Array
@@ -196,7 +195,7 @@ def test_reported_fit_is_the_distance_from_the_source(clip: tuple[str, bvh.Bvh])
     analysis = analyse_clip(source)
     placed, _ = world_transforms(analysis.motion.figure, analysis.motion.root, analysis.motion.rotations)
     scale = {"cm": 0.01, "CM": 0.0254 / 0.45}[analysis.unit[:2]]
-    position, _ = forward_kinematics(source, list(range(len(source.names))))
+    position, _ = source.world_transforms(list(range(len(source.names))))
     position = scale * position[len(position) - len(placed) :]
     apart = [
         1000.0 * np.linalg.norm(placed[:, JOINT_INDEX[joint]] - position[:, source.names.index(of)], axis=-1)

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bunraku.motion.bvh import Bvh, parse_bvh
-from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.rotation import from_rotation_vector
@@ -96,7 +95,33 @@ def motions(draw: st.DrawFn) -> Motion:
 def test_written_motion_parses_to_the_same_motion(motion: Motion) -> None:
     bvh: Bvh = parse_bvh(write_bvh(motion))
     assert (bvh.names, bvh.notes, bvh.fps) == (JOINTS, (), motion.fps)
-    position, orientation = forward_kinematics(bvh, list(range(JOINT_COUNT)))
+    position, orientation = bvh.world_transforms(list(range(JOINT_COUNT)))
     true_position, true_orientation = world_transforms(motion.figure, motion.root, motion.rotations)
     assert np.abs(position / 100.0 - true_position).max() < 1e-6
     assert np.abs(np.sum(orientation * true_orientation, axis=-1)).min() > 1.0 - 1e-9
+
+
+def test_quarter_turn_about_z_rotates_the_spine() -> None:
+    bvh = parse_bvh(HIERARCHY_TEXT + motion_section(b"1 2 3 90 0 0 0 0 0", b"1 2 3 90 90 0 0 0 0"))
+    position, _ = bvh.world_transforms([1])
+    assert position[:, 0].tolist() == [[1.0, 2.0, 3.0]] * 2
+    # z first, then x about the turned x: the spine, y, goes to -x, then to z
+    assert position[:, 1] == pytest.approx(np.array([[-9.5, 2.0, 3.0], [1.0, 2.0, 13.5]]))
+    assert bvh.rest_positions.tolist() == [[0.0, 0.0, 0.0], [0.0, 10.5, 0.0]]
+    assert bvh.channel_columns == [0, 6]
+
+
+@pytest.mark.parametrize("y", [10.5, 0.0])
+def test_limb_position_channels_replace_or_extend_the_offset(y: float) -> None:
+    channels = b"6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+    row = b"0 0 0 0 0 0 0.5 %f 0 0 0 0" % y
+    bvh = parse_bvh(HIERARCHY_TEXT.replace(b"3 Zrotation Xrotation Yrotation", channels, 1) + motion_section(row, row))
+    position, _ = bvh.world_transforms([1], np.array([1]))
+    assert position[0, 1].tolist() == [0.5, 10.5, 0.0]
+
+
+def test_root_without_position_channels_stays_at_its_offset() -> None:
+    bvh = parse_bvh(
+        HIERARCHY_TEXT.replace(b"6 Xposition Yposition Zposition", b"3", 1) + motion_section(b"0 0 0 0 0 0")
+    )
+    assert bvh.world_transforms([0])[0][:, 0].tolist() == [[0.0, 90.0, 0.0]]

@@ -6,7 +6,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.motion import bvh, rotation
-from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rest_pose import METRES_PER_UNIT, RestPose, find_rest_pose, resolve_sides, sample_frames
 from bunraku.motion.rotation import Array
@@ -20,7 +19,7 @@ UP: Array = np.array([0.0, 1.0, 0.0])
 def rest_pose_of(data: bytes) -> tuple[RestPose, bvh.Bvh]:
     source = bvh.parse_bvh(data)
     frames = sample_frames(source)
-    position, orientation = forward_kinematics(source, list(range(len(source.names))), frames)
+    position, orientation = source.world_transforms(list(range(len(source.names))), frames)
     return find_rest_pose(source, dict(JOINTS_BY_NAME), frames, position, orientation), source
 
 
@@ -87,7 +86,7 @@ def test_motion_on_another_axis_than_its_rest_is_rotated() -> None:
     motion = smooth_motion(frames=30, swing=0.2)
     source = bvh.parse_bvh(export_bvh(motion))
     lie = rotation.from_coordinate_axis(0, np.array(np.pi / 2))
-    position, orientation = forward_kinematics(source, list(range(18)), sample_frames(source))
+    position, orientation = source.world_transforms(list(range(18)), sample_frames(source))
     position, orientation = rotation.rotate(lie, position), rotation.multiply(lie, orientation)
     rest = find_rest_pose(source, dict(JOINTS_BY_NAME), sample_frames(source), position, orientation)
     assert "The motion stands on another axis than the rest pose." in rest.assumptions
@@ -111,7 +110,7 @@ def test_lying_body_stays_lying() -> None:
 
 def sampled_positions(motion: Motion) -> Array:
     source = bvh.parse_bvh(export_bvh(motion))
-    return forward_kinematics(source, list(range(18)), sample_frames(source))[0]
+    return source.world_transforms(list(range(18)), sample_frames(source))[0]
 
 
 @pytest.mark.parametrize("profile", ["VRM", SHAPE_PROFILE])

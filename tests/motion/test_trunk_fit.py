@@ -7,7 +7,6 @@ import pytest
 
 from bunraku.motion import bvh
 from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.fit import FigureFit
 from bunraku.motion.rest_pose import find_rest_pose, sample_frames
 from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
@@ -20,9 +19,9 @@ MOTION = smooth_motion(frames=40)
 @pytest.fixture
 def fit() -> FigureFit:
     source = bvh.parse_bvh(export_bvh(MOTION))
-    position, orientation = forward_kinematics(source, list(range(18)), sample_frames(source))
+    position, orientation = source.world_transforms(list(range(18)), sample_frames(source))
     joints = {name: joint for name, joint in JOINT_INDEX.items() if name != "vl5"}
-    return FigureFit.from_bvh(
+    return FigureFit.from_source(
         source, joints, find_rest_pose(source, joints, sample_frames(source), position, orientation)
     )
 

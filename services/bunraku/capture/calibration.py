@@ -15,21 +15,19 @@ from bunraku.capture.errors import UnreadableCapture
 from bunraku.capture.frame import CapturedFrame, CaptureSkeleton
 from bunraku.capture.source_pose import SourcePose, find_parents
 from bunraku.marionette.solver.vector import IDENTITY, ZERO, Quaternion, Vector, subtract
+from bunraku.motion import rotation
 from bunraku.motion.analysis import SourceFit, fit_source
-from bunraku.motion.bvh import Bvh
-from bunraku.motion.bvh_writer import euler_zxy
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
+from bunraku.motion.source_motion import SampledMotion, chain_transforms
 
 MAX_CALIBRATION_FRAMES = 512
 """Two seconds at 240 frames/s."""
-NOMINAL_FRAME_TIME_S = 1.0 / 60.0
-"""Frame time of the structure that is analysed. The result does not depend on it."""
+NOMINAL_FPS = 60.0
+"""Frame rate of the motion that is analysed. The result does not depend on it."""
 LEG_RANGE_M = (0.1, 3.0)
 """Range of a thigh and a shin together after the detection of the unit; beyond it the positions are not a body's."""
-
-_CHANNELS = ("Xposition", "Yposition", "Zposition", "Zrotation", "Xrotation", "Yrotation")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +67,10 @@ def calibrate(skeleton: CaptureSkeleton, frames: Sequence[CapturedFrame]) -> Cal
     if not joints:
         raise UnreadableCapture("No joints", "no frame has a joint with rotation and position")
     offsets, turns = _track_joints(skeleton, joints, frames)
-    bvh = _build_source(joints, find_parents(skeleton, joints), offsets, turns)
+    source = _build_source(joints, find_parents(skeleton, joints), offsets, turns)
     try:
         with np.errstate(all="ignore"):
-            fit = fit_source(bvh)
+            fit = fit_source(source)
             figure = fit.build_figure()
     except UnreadableMotion as error:
         raise UnreadableCapture(error.title, error.detail, field=error.field, hint=_REMEDY) from error
@@ -128,22 +126,23 @@ def _track_joints(
     return np.array([offsets for offsets, _ in tracks]), np.array([turns for _, turns in tracks])
 
 
-def _build_source(joints: Sequence[str], parents: Sequence[int], offsets: Array, turns: Array) -> Bvh:
-    """Return the frames as the structure of a BVH file, with the mean positions as rest pose."""
+def _build_source(joints: Sequence[str], parents: Sequence[int], offsets: Array, turns: Array) -> SampledMotion:
+    """Return the frames as a source motion whose rest pose has the mean positions."""
     if parents.count(-1) > 1:
         names = [joint for joint, parent in zip(joints, parents, strict=True) if parent < 0]
         raise UnreadableCapture("Separate joints", f"{', '.join(names[:5])} have no common parent", hint=_REMEDY)
-    values = np.concatenate([offsets, euler_zxy(turns)], axis=-1)
-    return Bvh(
+    positions, orientations = chain_transforms(parents, offsets, turns)
+    rest_turns = np.tile(rotation.IDENTITY, (len(joints), 1))
+    rest_positions, rest_orientations = chain_transforms(parents, offsets.mean(axis=0), rest_turns)
+    return SampledMotion(
         names=tuple(joints),
         parents=tuple(parents),
-        offsets=offsets.mean(axis=0),
-        channels=(_CHANNELS,) * len(joints),
-        joint_lines=(0,) * len(joints),
         ends=(),
-        frames=values.reshape(len(values), -1),
-        frame_time=NOMINAL_FRAME_TIME_S,
-        notes=(),
+        fps=NOMINAL_FPS,
+        rest_positions=rest_positions,
+        rest_orientations=rest_orientations,
+        positions=positions,
+        orientations=orientations,
     )
 
 

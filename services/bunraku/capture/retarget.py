@@ -75,7 +75,7 @@ class Retargeter:
             {
                 ancestor
                 for joint in _list_sources(fit.rules) | {fit.joints[0]}
-                for ancestor in ancestor_chain(fit.bvh.parents, joint)
+                for ancestor in ancestor_chain(fit.source.parents, joint)
             }
         )
         index = {joint: number for number, joint in enumerate(used)}

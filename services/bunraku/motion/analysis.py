@@ -7,8 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.bvh import Bvh
-from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.fit import FigureFit
 from bunraku.motion.joint_tree import common_ancestor
@@ -26,6 +24,7 @@ from bunraku.motion.skeleton import (
     joint_and_tip_positions,
     world_transforms,
 )
+from bunraku.motion.source_motion import SourceMotion
 from bunraku.motion.trunk_fit import fit_trunk
 
 MAX_TRAVEL_M, MAX_DISTANCE_M = 1e3, 1e9
@@ -81,51 +80,51 @@ class SourceFit:
         return Figure(offsets, self.fit.tips)
 
 
-def analyse(bvh: Bvh) -> Analysis:
-    """Fit the 19 channels and a figure with the source's limb lengths to `bvh`.
+def analyse(source: SourceMotion) -> Analysis:
+    """Fit the 19 channels and a figure with the source's limb lengths to `source`.
 
     The figure's rest pose is H-Anim's I-pose, facing z, y up; elbows, wrists, knees, ankles and finger tips lie
     straight below the previous joint, so that an elbow bends about -x and a knee about x. Raises `UnreadableMotion` if
     the skeleton is not humanoid.
     """
-    source = fit_source(bvh)
-    fit = source.fit
-    motion = Motion(source.build_figure(), bvh.fps, fit.joint_positions[:, 0].copy(), fit.local_rotations())
+    fitted = fit_source(source)
+    fit = fitted.fit
+    motion = Motion(fitted.build_figure(), source.fps, fit.joint_positions[:, 0].copy(), fit.local_rotations())
     placed, _ = world_transforms(motion.figure, motion.root, motion.rotations)
     mapped = sorted(fit.joints)
     apart = 1000.0 * np.linalg.norm(placed[:, mapped] - fit.position[:, [fit.joints[j] for j in mapped]], axis=-1)
     if apart.mean() > POOR_FIT_MM:
-        source.assumptions.append(
+        fitted.assumptions.append(
             f"The fit is poor: the figure's joints are {apart.mean():.0f} mm from the source's on average. "
             "The source may not have the body of a human."
         )
     return Analysis(
         motion=motion,
-        profile=source.profile,
-        source_joints={JOINTS[joint]: bvh.names[fit.joints[joint]] for joint in mapped},
-        rest_pose=source.rest.pose,
-        unit=source.rest.unit,
-        assumptions=source.assumptions,
+        profile=fitted.profile,
+        source_joints={JOINTS[joint]: source.names[fit.joints[joint]] for joint in mapped},
+        rest_pose=fitted.rest.pose,
+        unit=fitted.rest.unit,
+        assumptions=fitted.assumptions,
         mean_fit_error_mm=float(apart.mean()),
         max_fit_error_mm=float(apart.max()),
     )
 
 
-def fit_source(bvh: Bvh) -> SourceFit:
-    """Fit a figure and the rules of its joints to all frames of `bvh`; raise `UnreadableMotion` as `analyse` does."""
-    naming = map_by_name(bvh.names, bvh.parents) or map_by_shape(bvh)
-    guessed = [*bvh.notes]
-    frames = sample_frames(bvh)
-    position, orientation = forward_kinematics(bvh, list(range(len(bvh.names))), frames)
+def fit_source(source: SourceMotion) -> SourceFit:
+    """Fit a figure and the rules of its joints to all frames of `source`. Raises `UnreadableMotion` as `analyse`."""
+    naming = map_by_name(source.names, source.parents) or map_by_shape(source)
+    guessed = [*source.notes]
+    frames = sample_frames(source)
+    position, orientation = source.world_transforms(list(range(len(source.names))), frames)
     joints, exchanged = resolve_sides(position, naming)
     guessed += exchanged
-    joints = _complete_mapping(bvh, joints, guessed)
+    joints = _complete_mapping(source, joints, guessed)
     if naming.profile == SHAPE_PROFILE:
-        pairs = ", ".join(f"{joint} = {bvh.names[source]}" for joint, source in sorted(joints.items()))
+        pairs = ", ".join(f"{joint} = {source.names[index]}" for joint, index in sorted(joints.items()))
         guessed.append(f"No naming convention matches; the skeleton's shape gave {pairs}.")
-    rest = find_rest_pose(bvh, joints, frames, position, orientation)
+    rest = find_rest_pose(source, joints, frames, position, orientation)
     guessed += rest.assumptions
-    fit = FigureFit.from_bvh(bvh, joints, rest)
+    fit = FigureFit.from_source(source, joints, rest)
     if _starts_with_calibration_pose(fit):
         guessed.append("The first frame is a pose apart from the dance; it was left out.")
         fit = fit.without_first_frame()
@@ -137,7 +136,7 @@ def fit_source(bvh: Bvh) -> SourceFit:
     return SourceFit(fit, rest, naming.profile, moved, guessed)
 
 
-def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:
+def _complete_mapping(source: SourceMotion, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:
     """Return the mapping with root and head, if names or shape left them open.
 
     The root is the joint where legs and trunk separate, whatever its name: files may have a joint on the floor above
@@ -146,13 +145,13 @@ def _complete_mapping(bvh: Bvh, joints: dict[str, int], assumptions: list[str]) 
     joints = dict(joints)
     hips = [joints["l_hip"], joints["r_hip"]]
     if "skullbase" not in joints:
-        head = find_head_by_name(bvh.names, bvh.parents, joints)
-        if head is None and (head := find_head(bvh, joints)) is not None:
-            assumptions.append(f"No joint is named as the head; {bvh.names[head]} was taken for it.")
+        head = find_head_by_name(source.names, source.parents, joints)
+        if head is None and (head := find_head(source, joints)) is not None:
+            assumptions.append(f"No joint is named as the head; {source.names[head]} was taken for it.")
         if head is not None:
             joints["skullbase"] = head
-    root = common_ancestor(bvh.parents, [*hips, joints["l_shoulder"], joints["r_shoulder"]])
-    pelvis = common_ancestor(bvh.parents, hips)
+    root = common_ancestor(source.parents, [*hips, joints["l_shoulder"], joints["r_shoulder"]])
+    pelvis = common_ancestor(source.parents, hips)
     joints["humanoid_root"] = root
     for name in ("sacroiliac", "vl5"):
         joints.pop(name, None)
@@ -193,7 +192,7 @@ def _move_to_stage(fit: FigureFit, assumptions: list[str]) -> Array:
             raise UnreadableMotion(
                 "Leaves the stage",
                 f"in frame {frame + 1} the body is {apart[frame]:.3g} m from {name}",
-                field=fit.bvh.names[fit.joints[0]],
+                field=fit.source.names[fit.joints[0]],
                 hint=f"correct the positions of the root: at most {limit:.0g} m can be read",
             )
     if abs(lowest) > FLOOR_TOLERANCE_M:

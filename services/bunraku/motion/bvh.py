@@ -10,11 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
+from bunraku.motion import rotation
 from bunraku.motion.bvh_frames import parse_frames
-from bunraku.motion.bvh_hierarchy import EndSite, parse_hierarchy
+from bunraku.motion.bvh_hierarchy import parse_hierarchy
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rotation import Array
+from bunraku.motion.source_motion import EndSite
 
 BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
 
@@ -50,6 +54,76 @@ class Bvh:
             if whole > 0 and abs(rate - whole) < 0.02 * rate and round(1.0 / whole, digits) == self.frame_time:
                 return float(whole)
         return rate
+
+    @property
+    def frame_count(self) -> int:
+        """Number of frames."""
+        return len(self.frames)
+
+    @property
+    def channel_columns(self) -> list[int]:
+        """First column of each joint's channels in `frames`."""
+        widths = [len(channels) for channels in self.channels]
+        return [0, *np.cumsum(widths)[:-1].tolist()]
+
+    @property
+    def rest_positions(self) -> Array:
+        """World positions (J, 3) of all joints without rotation, root at the origin."""
+        position = np.zeros((len(self.names), 3))
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                position[joint] = position[parent] + self.offsets[joint]
+        return position
+
+    @property
+    def rest_orientations(self) -> Array:
+        """World orientations (J, 4) of all joints without rotation."""
+        return np.tile(rotation.IDENTITY, (len(self.names), 1))
+
+    def world_transforms(self, joints: list[int], frames: npt.NDArray[np.int64] | None = None) -> tuple[Array, Array]:
+        """Return world positions (n, J, 3) and orientations (n, J, 4) of `joints` and their ancestors; others are zero.
+
+        Rotation channels apply in file order, each about the axis rotated by the previous ones. Position channels
+        replace the offset, as exporters mean them; below the root, if they stay nearer to zero than to the offset, they
+        are added to it.
+        """
+        values = self.frames if frames is None else self.frames[frames]
+        position = np.zeros((len(values), len(self.names), 3))
+        orientation = np.zeros((len(values), len(self.names), 4))
+        columns = self.channel_columns
+        used = {ancestor for joint in joints for ancestor in ancestor_chain(self.parents, joint)}
+        for joint in sorted(used):
+            parent = self.parents[joint]
+            local, offset = _local_transform(self, joint, values, columns[joint])
+            if parent < 0:
+                position[:, joint], orientation[:, joint] = offset, local
+            else:
+                up = orientation[:, parent]
+                position[:, joint] = position[:, parent] + rotation.rotate(up, offset)
+                orientation[:, joint] = rotation.multiply(up, local)
+        return position, orientation
+
+
+def _local_transform(bvh: Bvh, joint: int, values: Array, column: int) -> tuple[Array, Array]:
+    """Return rotation (n, 4) and offset (n, 3) of a joint relative to its parent."""
+    turned = np.tile(rotation.IDENTITY, (len(values), 1))
+    offset = bvh.offsets[joint]
+    moved = np.tile(offset, (len(values), 1))
+    for index, channel in enumerate(bvh.channels[joint]):
+        track = values[:, column + index]
+        axis = "XYZ".index(channel[0])
+        if channel.endswith("rotation"):
+            turned = rotation.multiply(turned, rotation.from_coordinate_axis(axis, np.radians(track)))
+        elif channel.endswith("position"):
+            moved[:, axis] = track
+    given = ["XYZ".index(c[0]) for c in bvh.channels[joint] if c.endswith("position")]
+    if given and bvh.parents[joint] >= 0:
+        # over the whole clip, so that the result does not depend on the selected frames
+        columns = [column + index for index, c in enumerate(bvh.channels[joint]) if c.endswith("position")]
+        mean = bvh.frames[:, columns].mean(axis=0)
+        if np.linalg.norm(mean) < np.linalg.norm(mean - offset[given]):
+            moved[:, given] += offset[given]
+    return turned, moved
 
 
 def parse_bvh(data: bytes) -> Bvh:

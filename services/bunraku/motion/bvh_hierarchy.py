@@ -11,6 +11,7 @@ import numpy as np
 
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.rotation import Array
+from bunraku.motion.source_motion import EndSite
 
 MAX_JOINTS = 1_000
 MAX_DEPTH = 256
@@ -25,14 +26,6 @@ _SEPARATOR = re.compile(rb"(?:\s++|(?:#|//)[^\n]*+)*+")
 _WORD = re.compile(rb"[{}]|[^\s{}]+")
 _NAME = re.compile(rb"[^\n{}]*")
 _DECIMAL_COMMA = re.compile(rb"[+-]?\d*,\d+(?:[eE][+-]?\d+)?")
-
-
-@dataclass(frozen=True, slots=True)
-class EndSite:
-    """End of the last bone of a chain: `offset` (3,) from joint `parent`, in the file's units."""
-
-    parent: int
-    offset: Array
 
 
 @dataclass(frozen=True, slots=True)

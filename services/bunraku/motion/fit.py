@@ -7,13 +7,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bunraku.motion import procrustes, rotation
-from bunraku.motion.bvh import Bvh
-from bunraku.motion.bvh_kinematics import forward_kinematics
 from bunraku.motion.joint_rule import JointRule, aim_at
 from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rest_pose import RestPose
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS
+from bunraku.motion.source_motion import SourceMotion
 
 
 @dataclass(slots=True)
@@ -26,7 +25,7 @@ class FigureFit:
     (n, 18, 4) in the world.
     """
 
-    bvh: Bvh
+    source: SourceMotion
     joints: dict[int, int]
     scale: float
     position: Array
@@ -46,17 +45,17 @@ class FigureFit:
         self.joint_positions, self.joint_orientations = np.zeros((n, JOINT_COUNT, 3)), np.zeros((n, JOINT_COUNT, 4))
 
     @classmethod
-    def from_bvh(cls, bvh: Bvh, joints: dict[str, int], rest: RestPose) -> FigureFit:
-        """Return the whole clip of `bvh` in the figure's axes, with no joint placed yet."""
-        index = {JOINT_INDEX[name]: source for name, source in joints.items()}
-        used = sorted({ancestor for source in index.values() for ancestor in ancestor_chain(bvh.parents, source)})
-        position, orientation = forward_kinematics(bvh, used)
+    def from_source(cls, source: SourceMotion, joints: dict[str, int], rest: RestPose) -> FigureFit:
+        """Return the whole clip of `source` in the figure's axes, with no joint placed yet."""
+        index = {JOINT_INDEX[name]: joint for name, joint in joints.items()}
+        used = sorted({ancestor for joint in index.values() for ancestor in ancestor_chain(source.parents, joint)})
+        position, orientation = source.world_transforms(used)
         axes = rotation.multiply(rest.rest_to_figure, rest.orientations)
         turn = np.zeros_like(orientation)
         turned = rotation.multiply(rest.motion_to_figure, orientation[:, used])
         turn[:, used] = rotation.multiply(turned, rotation.conjugate(axes[used]))
         return cls(
-            bvh=bvh,
+            source=source,
             joints=index,
             scale=rest.scale,
             position=rest.scale * rotation.rotate(rest.motion_to_figure, position),
@@ -123,15 +122,14 @@ class FigureFit:
 
     def farthest_descendant(self, source: int) -> Array | None:
         """Return the vector (3,) from a source joint to its farthest descendant at rest; None if it has none."""
-        below = [
-            joint for joint in range(source, len(self.bvh.parents)) if source in ancestor_chain(self.bvh.parents, joint)
-        ]
+        parents = self.source.parents
+        below = [joint for joint in range(source, len(parents)) if source in ancestor_chain(parents, joint)]
         found = [self.rest_positions[joint] - self.rest_positions[source] for joint in below[1:]]
         found += [
             self.rest_positions[end.parent]
             - self.rest_positions[source]
             + self.scale * rotation.rotate(self.rest_orientations[end.parent], end.offset)
-            for end in self.bvh.ends
+            for end in self.source.ends
             if end.parent in below
         ]
         far = max(found, key=lambda v: float(np.linalg.norm(v)), default=None)

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.bvh import Bvh
-from bunraku.motion.bvh_kinematics import rest_positions
 from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
+from bunraku.motion.source_motion import SourceMotion
 
 REFERENCE_LEG_M = 0.82
 """Leg of an adult, hip to ankle, from which the unit is detected."""
@@ -48,9 +47,9 @@ class RestPose:
     assumptions: tuple[str, ...]
 
 
-def sample_frames(bvh: Bvh) -> np.ndarray:
+def sample_frames(source: SourceMotion) -> np.ndarray:
     """Return indices of at most `MAX_SAMPLED_FRAMES` frames, evenly over the clip, including the first."""
-    return np.unique(np.linspace(0, len(bvh.frames) - 1, MAX_SAMPLED_FRAMES).astype(np.int64))
+    return np.unique(np.linspace(0, source.frame_count - 1, MAX_SAMPLED_FRAMES).astype(np.int64))
 
 
 def resolve_sides(position: Array, mapping: JointMapping) -> tuple[dict[str, int], list[str]]:
@@ -88,21 +87,21 @@ def resolve_sides(position: Array, mapping: JointMapping) -> tuple[dict[str, int
 
 
 def find_rest_pose(
-    bvh: Bvh, joints: dict[str, int], frames: np.ndarray, position: Array, orientation: Array
+    source: SourceMotion, joints: dict[str, int], frames: np.ndarray, position: Array, orientation: Array
 ) -> RestPose:
-    """Detect the rest pose of `bvh`; `joints` maps H-Anim joints to source indices.
+    """Detect the rest pose of `source`; `joints` maps H-Anim joints to source indices.
 
     `position` (n, J, 3) and `orientation` (n, J, 4) are the sampled `frames` in the source's unit and axes.
     """
     guessed: list[str] = []
     unit, scale = _detect_unit(position, joints, guessed)
-    at_rest = rest_positions(bvh)
+    at_rest = source.rest_positions
     up = rotation.normalise(_body_up(position, joints).mean(axis=0))
     if _is_standing(at_rest, joints):
         kind = _classify_arms(at_rest, joints)
         upright = _figure_axes(at_rest, joints, _nearest_axis(_body_up(at_rest[None], joints)[0]))
         world = _resolve_motion_axes(upright, up, position, joints, guessed)
-        orientations = np.tile(rotation.IDENTITY, (len(bvh.names), 1))
+        orientations = source.rest_orientations
     else:
         kind = "bone-aligned"
         axis = _nearest_axis(up)

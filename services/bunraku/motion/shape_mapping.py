@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bunraku.motion.bvh import Bvh
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.joint_tree import ancestor_chain, common_ancestor, is_descendant
 from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
+from bunraku.motion.source_motion import SourceMotion, bone_lengths
 
 MAX_LENGTH_DIFFERENCE = 0.15
 """Largest difference of left and right bones, as a share of the longer."""
@@ -40,15 +40,14 @@ class _LimbCandidate:
         return sum(self.bone_lengths)
 
 
-def map_by_shape(bvh: Bvh) -> JointMapping:
+def map_by_shape(source: SourceMotion) -> JointMapping:
     """Return the mapping that the skeleton's shape gives, with sides not yet distinguished.
 
     Raises `UnreadableMotion` if the skeleton does not have two pairs of limbs.
     """
-    parents = bvh.parents
-    lengths = np.linalg.norm(bvh.offsets, axis=1)
-    lengths[0] = 0.0
-    pairs = _find_limb_pairs(bvh, lengths)
+    parents = source.parents
+    lengths = bone_lengths(source)
+    pairs = _find_limb_pairs(source, lengths)
     legs = pairs[0] if pairs else None
     arms = next(
         (pair for pair in pairs if legs and all(_are_disjoint(a, b, parents) for a in pair for b in legs)), None
@@ -57,8 +56,8 @@ def map_by_shape(bvh: Bvh) -> JointMapping:
         raise UnreadableMotion(
             "Not a humanoid",
             "neither the joints' names nor the skeleton's shape show two arms and two legs",
-            line=bvh.joint_lines[0],
-            field=bvh.names[0],
+            line=source.joint_lines[0],
+            field=source.names[0],
             hint="name the joints as Mixamo, MotionBuilder, VRM or H-Anim do, and send the whole body",
         )
     arms = _skip_collar_bones(arms, pairs)
@@ -66,24 +65,24 @@ def map_by_shape(bvh: Bvh) -> JointMapping:
     for side, leg, arm in zip("lr", legs, arms, strict=True):
         joints |= dict(zip((f"{side}_hip", f"{side}_knee", f"{side}_ankle"), leg.joints, strict=True))
         joints |= dict(zip((f"{side}_shoulder", f"{side}_elbow", f"{side}_wrist"), arm.joints, strict=True))
-        toes = _longest_branch(bvh, lengths, leg.joints[2], set())
+        toes = _longest_branch(source, lengths, leg.joints[2], set())
         if toes and lengths[toes[0]] > 0.05 * leg.length:
             joints[f"{side}_midtarsal"] = toes[0]
     return JointMapping(SHAPE_PROFILE, joints)
 
 
-def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
+def find_head(source: SourceMotion, joints: dict[str, int]) -> int | None:
     """Return the head's joint: the end of the longest branch that leaves the spine above the hips."""
-    lengths = np.linalg.norm(bvh.offsets, axis=1)
+    lengths = bone_lengths(source)
     arms = [joints["l_shoulder"], joints["r_shoulder"]]
     legs = [joints["l_hip"], joints["r_hip"]]
     leg = lengths[joints["l_knee"]] + lengths[joints.get("l_ankle", joints["l_knee"])]
-    chest = common_ancestor(bvh.parents, arms)
-    excluded = {joint for limb in arms + legs for joint in ancestor_chain(bvh.parents, limb)}
+    chest = common_ancestor(source.parents, arms)
+    excluded = {joint for limb in arms + legs for joint in ancestor_chain(source.parents, limb)}
     excluded.discard(chest)
-    branch = _longest_branch(bvh, lengths, chest, excluded)
+    branch = _longest_branch(source, lengths, chest, excluded)
     above = 0.0
-    ends = {end.parent: float(np.linalg.norm(end.offset)) for end in bvh.ends}
+    ends = {end.parent: float(np.linalg.norm(end.offset)) for end in source.ends}
     for joint in reversed(branch):
         above = max(above, ends.get(joint, 0.0))
         if above >= MIN_HEAD_RATIO * leg:
@@ -92,16 +91,16 @@ def find_head(bvh: Bvh, joints: dict[str, int]) -> int | None:
     return branch[-1] if branch else None
 
 
-def _find_limb_pairs(bvh: Bvh, lengths: Array) -> list[tuple[_LimbCandidate, _LimbCandidate]]:
+def _find_limb_pairs(source: SourceMotion, lengths: Array) -> list[tuple[_LimbCandidate, _LimbCandidate]]:
     """Return pairs of limbs that are alike and disjoint, longest first."""
-    limbs = sorted(_find_limbs(bvh, lengths), key=lambda limb: -limb.length)[:60]
+    limbs = sorted(_find_limbs(source, lengths), key=lambda limb: -limb.length)[:60]
     found = [
         (a, b)
         for a, b in itertools.combinations(limbs, 2)
         if all(
             abs(x - y) <= MAX_LENGTH_DIFFERENCE * max(x, y) for x, y in zip(a.bone_lengths, b.bone_lengths, strict=True)
         )
-        and _are_disjoint(a, b, bvh.parents)
+        and _are_disjoint(a, b, source.parents)
     ]
     found.sort(key=lambda pair: -min(pair[0].length, pair[1].length))
     return [pair for pair in found if pair[1].length > MIN_LIMB_RATIO * found[0][0].length]
@@ -118,16 +117,16 @@ def _skip_collar_bones(
     return arms
 
 
-def _find_limbs(bvh: Bvh, lengths: Array) -> list[_LimbCandidate]:
+def _find_limbs(source: SourceMotion, lengths: Array) -> list[_LimbCandidate]:
     """Return all pairs of consecutive bones, neither over twice the other; zero-length joints between are skipped."""
     short = MAX_SHORT_RATIO * float(np.median(lengths[lengths > 0.0])) if lengths.any() else 0.0
     found = []
-    for end, middle in enumerate(bvh.parents):
+    for end, middle in enumerate(source.parents):
         if middle < 0 or lengths[end] <= short:
             continue
-        while lengths[middle] <= short and bvh.parents[middle] >= 0:
-            middle = bvh.parents[middle]
-        start = bvh.parents[middle]
+        while lengths[middle] <= short and source.parents[middle] >= 0:
+            middle = source.parents[middle]
+        start = source.parents[middle]
         bones = (float(lengths[middle]), float(lengths[end]))
         if start >= 0 and max(bones) <= 2.0 * min(bones):
             found.append(_LimbCandidate((start, middle, end), bones))
@@ -141,14 +140,14 @@ def _are_disjoint(a: _LimbCandidate, b: _LimbCandidate, parents: tuple[int, ...]
     return not is_descendant(parents, a.joints[0], b.joints[0]) and not is_descendant(parents, b.joints[0], a.joints[0])
 
 
-def _longest_branch(bvh: Bvh, lengths: Array, start: int, excluded: set[int]) -> list[int]:
+def _longest_branch(source: SourceMotion, lengths: Array, start: int, excluded: set[int]) -> list[int]:
     """Return the joints below `start` along its longest branch, without those in `excluded`."""
     reach = np.zeros(len(lengths))
     longest: dict[int, int] = {}
-    for end in bvh.ends:
+    for end in source.ends:
         reach[end.parent] = max(reach[end.parent], float(np.linalg.norm(end.offset)))
     for joint in range(len(lengths) - 1, 0, -1):
-        parent = bvh.parents[joint]
+        parent = source.parents[joint]
         length = lengths[joint] + reach[joint]
         if joint not in excluded and (parent not in longest or length > reach[parent]):
             longest[parent] = joint

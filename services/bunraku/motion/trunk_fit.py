@@ -69,9 +69,9 @@ def _fit_chest(fit: FigureFit) -> None:
     sources = [fit.joints[joint] for joint in carried]
     weights = CHEST_POINT_WEIGHTS[-len(carried) :]
     root = fit.joints[0]
-    above = ancestor_chain(fit.bvh.parents, root)
+    above = ancestor_chain(fit.source.parents, root)
     shoulder_chain = ancestor_chain(
-        fit.bvh.parents, common_ancestor(fit.bvh.parents, [fit.joints[JOINT_INDEX[name]] for name in SHOULDERS])
+        fit.source.parents, common_ancestor(fit.source.parents, [fit.joints[JOINT_INDEX[name]] for name in SHOULDERS])
     )
     spine = [joint for joint in reversed(shoulder_chain) if joint not in above] or [root]
     chosen = _select_chest(fit, spine, sources, weights)
