@@ -373,7 +373,7 @@ class Stage:
     def _publish_frames(self, frames: range, lateness_us: int = 0) -> bool:
         """Publish the overlay of some frames, each due `OVERLAY_LEAD_US` after its time.
 
-        Returns whether any limb is controlled. `lateness_us` is the delay of this call, in which no message could be
+        Returns whether more frames follow. `lateness_us` is the delay of this call, in which no message could be
         received: it does not count as silence of a puppeteer.
         """
         now, begin_s = self._clock(), time.perf_counter()
@@ -402,7 +402,8 @@ class Stage:
             self.log.add_message(due, message)
             self._bus.publish(f"session.{self.id}.overlay", message)
         self._counters.tick_duration_s.observe(time.perf_counter() - begin_s)
-        return not self._ownership.is_at_rest or self.live.is_shown
+        # the first samples are shown only after their delay
+        return not self._ownership.is_at_rest or self.live.is_shown or self.live.has_unshown_samples(now)
 
     def _poses_at(self, due: int, live: Mapping[int, Pose]) -> tuple[Array, ...] | None:
         """Return the rotations (18, 4) of each performer at clock time `due`, those of live ones as given."""

@@ -3,6 +3,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -96,6 +97,26 @@ async def test_samples_are_published_and_due_after_the_lead_and_the_delay(opened
     best = min(_angle(pose[1], vectors_at(dues[-1] - lag + shift)) for shift in range(-200_000, 200_001, 10_000))
     assert best < 0.1
     assert np.linalg.norm(pose[0] - [0.1, 0.9, 0.2]) < 0.01
+
+
+@pytest.mark.parametrize("phase_us", range(0, Live.FRAME_INTERVAL_US, Live.FRAME_INTERVAL_US // 8))
+async def test_performer_is_shown_at_any_phase_of_samples_and_frames(phase_us: int) -> None:
+    await asyncio.to_thread(motion_decoder.warm_up)
+    bus = MemoryBus()
+    cast = Cast("", (CastMember("p", "Aiko", 60.0, None),))
+    motion = stored_motion(cast.motion, 5)
+    state = timeline.start(motion.id, motion.first_track.duration_us, clock())
+    with mock.patch("secrets.randbelow", return_value=phase_us):
+        stage = Stage(SessionStart("s", motion, state, state.clock, cast=cast), bus, clock)
+    audience = StageMessages(bus)
+    # samples in step with the frames, as from a tool whose rate is exact
+    frame = clock() // Live.FRAME_INTERVAL_US + 1
+    for number in range(30):
+        sampled = (frame + number) * Live.FRAME_INTERVAL_US
+        await asyncio.sleep((sampled - clock()) * 1e-6)
+        assert stage.receive_sample("p", sample_at(sampled, number)) is not None
+    await stage.close()
+    assert any(isinstance(message, Live) for message in audience.messages)
 
 
 def _angle(rotations: Array, vectors: Array) -> float:

@@ -55,6 +55,11 @@ class LivePerformers:
         """True if the last message showed a performer."""
         return self._was_shown
 
+    def has_unshown_samples(self, now: int) -> bool:
+        """Return whether a performer has a sample that is to be shown after `now`."""
+        performances = [performer.performance for performer in self]
+        return any(one.newest_us is not None and one.newest_us > now - one.delay_us(now) for one in performances)
+
     def assign(self, cast: Cast, motion: StoredMotion) -> None:
         """Show the members of a cast on the last performers of a motion; nobody if it is not the cast motion."""
         known = {performer.member.id: performer for performer in self}
