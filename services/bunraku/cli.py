@@ -131,11 +131,14 @@ def upload(
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
+    take: Annotated[str | None, typer.Option(help="Motion of a file that has several.")] = None,
 ) -> None:
-    """Upload a motion file and print the analysed motion."""
+    """Upload a motion file (BVH, FBX, GLB, VRMA, or a zip archive) and print the analysed motion."""
     from rich.table import Table
 
-    motion = _send_file(file, server, token, as_json, lambda client, *callbacks: client.upload(file, *callbacks))
+    motion = _send_file(
+        file, server, token, as_json, lambda client, *callbacks: client.upload(file, *callbacks, take=take)
+    )
     if as_json:
         out.print_json(data=motion)
         return

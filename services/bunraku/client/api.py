@@ -8,6 +8,7 @@ import os
 import secrets
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 from urllib.parse import quote, urlsplit, urlunsplit
 
@@ -53,13 +54,16 @@ class Client:
         path: Path,
         progress: Callable[[int, int], None] | None = None,
         on_stage: Callable[[str, float], None] | None = None,
+        *,
+        take: str | None = None,
     ) -> dict[str, Any]:
         """Upload a motion file and wait until it can be watched.
 
-        `progress` receives bytes sent and total; `on_stage` repeatedly receives the server's stage (`preparing`,
-        `waiting`, `reading`, `encoding`) and the share done, 0..1.
+        `take` chooses a motion of a file that has several. `progress` receives bytes sent and total; `on_stage`
+        repeatedly receives the server's stage (`preparing`, `waiting`, `reading`, `encoding`) and the share done, 0..1.
         """
-        return await self._upload_file(path, "/v1/motions", progress, on_stage)
+        query = {} if take is None else {"take": take}
+        return await self._upload_file(path, "/v1/motions", progress, on_stage, query)
 
     async def add_audio(
         self,
@@ -202,6 +206,7 @@ class Client:
         endpoint: str,
         progress: Callable[[int, int], None] | None,
         on_stage: Callable[[str, float], None] | None,
+        query: Mapping[str, str] = MappingProxyType({}),
     ) -> dict[str, Any]:
         """Send a file to an endpoint, with the callbacks of `upload`."""
         size = await asyncio.to_thread(os.path.getsize, path)
@@ -221,7 +226,7 @@ class Client:
             return await self._request(
                 "POST",
                 endpoint,
-                params={"filename": path.name, "upload": name},
+                params={"filename": path.name, "upload": name, **query},
                 content=chunks(),
                 headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
             )

@@ -40,8 +40,11 @@ from bunraku.storage.removal import remove_motion
 UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
 """Pattern of an upload's name, which its client chooses at random."""
 
+MAX_TAKE_CHARACTERS = 200
+"""Length of the name of a take: as of a name in a motion file."""
 Filename = Annotated[str, Query(min_length=1, max_length=255)]
 UploadName = Annotated[str | None, Query(pattern=UPLOAD_NAME_PATTERN)]
+TakeName = Annotated[str | None, Query(min_length=1, max_length=MAX_TAKE_CHARACTERS)]
 
 
 def create_app(context: ServiceContext) -> FastAPI:
@@ -78,14 +81,21 @@ def create_app(context: ServiceContext) -> FastAPI:
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
-    async def upload(request: Request, filename: Filename, upload: UploadName = None) -> Response:
-        """Create a motion from the file in the request body.
+    async def upload(
+        request: Request, filename: Filename, upload: UploadName = None, take: TakeName = None
+    ) -> Response:
+        """Create a motion from the file in the request body: BVH, FBX, glTF, VRM, VRMA, or a zip archive of them.
+
+        Of a file with several takes, the one called `take` is read, by default the largest; `guessed` lists the others.
+        An Acclaim motion (AMC) is sent with its skeleton (ASF) in an archive, where files are takes.
 
         Uploading the same bytes again returns the same motion with 200. With a random name in `upload`,
         `GET /v1/uploads/{upload}` reports the progress meanwhile.
         """
         subject = access_of(request).subject
-        outcome = await uploads.receive(request, upload, lambda digest: create_motion_job(digest, filename, subject))
+        outcome = await uploads.receive(
+            request, upload, lambda digest: create_motion_job(digest, filename, subject, take)
+        )
         return _stored_response(outcome)
 
     @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)

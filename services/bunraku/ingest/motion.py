@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import hashlib
 import os
 from pathlib import Path, PurePath
 
@@ -18,11 +19,14 @@ from bunraku.runtime.display_text import clean_text
 from bunraku.storage.motion_id import derive_job_id, derive_motion_id
 
 
-def create_motion_job(digest: bytes, filename: str, subject: str) -> UploadJob:
-    """Describe the job for a motion file with this SHA-256 digest."""
+def create_motion_job(digest: bytes, filename: str, subject: str, take: str | None = None) -> UploadJob:
+    """Describe the job for a motion file with this SHA-256 digest, or for one of its takes."""
+    if take is not None:
+        digest = hashlib.sha256(digest + take.encode()).digest()
     motion_id, filename = derive_motion_id(digest), clean_filename(filename)
     job_id = derive_job_id(motion_id, subject)
-    return UploadJob(job_id, {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject})
+    details = {"kind": "motion", "motion": motion_id, "filename": filename, "subject": subject}
+    return UploadJob(job_id, details if take is None else {**details, "take": take})
 
 
 class MotionOperation:
@@ -34,7 +38,7 @@ class MotionOperation:
 
     async def run_job(self, details: JobDetails, path: Path, progress: UploadProgress) -> StoreOutcome:
         """Run a job of `create_motion_job` (a `JobHandler`)."""
-        source = SourceFile(path, details["filename"], details.get("subject", ""))
+        source = SourceFile(path, details["filename"], details.get("subject", ""), details.get("take"))
         return await self.ingest_file(details["motion"], source, progress)
 
     async def ingest_file(
@@ -50,13 +54,13 @@ class MotionOperation:
             progress.advance_to("reading")
             outcome = await self._worker_slots.run_job(
                 JobKind.MOTION,
-                (motion_id, source.path),
+                (motion_id, source.path, source.take),
                 self._context.settings.upload_seconds,
                 lambda share: progress.advance_to("encoding", share),
             )
         result = require_result(outcome, filename=source.filename)
         description = {
-            "name": clean_text(PurePath(source.filename).stem) or source.filename,
+            "name": clean_text(source.take or PurePath(source.filename).stem) or source.filename,
             "filename": source.filename,
             "bytes": await asyncio.to_thread(os.path.getsize, source.path),
             **result.description,

@@ -21,6 +21,8 @@ class SourceFile:
     """File name on the client's machine."""
     subject: str = ""
     """Subject that uploaded it."""
+    take: str | None = None
+    """Motion that is meant, of those in the file."""
 
 
 def clean_filename(filename: str) -> str:

@@ -15,7 +15,7 @@ def test_motion_is_encoded_and_described(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(1.5))
     shares: list[float] = []
-    result = encode_file("m1", source, shares.append)
+    result = encode_file("m1", source, on_progress=shares.append)
     assert isinstance(result, JobResult)
     assert result.description["blocks"] == 2
     # one report at the start, one per block and level

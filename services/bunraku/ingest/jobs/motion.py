@@ -14,6 +14,7 @@ from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import analyse
 from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers.motion_file import read_motion
 
 _MINIMAL_BVH = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"
 
@@ -22,11 +23,11 @@ parse_bvh(_MINIMAL_BVH)
 
 
 def encode_file(
-    motion_id: str, path: Path, on_progress: Callable[[float], None] = lambda _: None
+    motion_id: str, path: Path, take: str | None = None, on_progress: Callable[[float], None] = lambda _: None
 ) -> JobResult | JobRejection:
-    """Parse, analyse and encode the file at `path`; `on_progress` receives the encoded share, 0..1."""
+    """Parse, analyse and encode `take` of the file at `path`; `on_progress` receives the encoded share, 0..1."""
     try:
-        analysis = analyse(parse_bvh(path.read_bytes()))
+        analysis = analyse(read_motion(path.read_bytes(), take))
         for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
             ArmRig(analysis.motion.figure, limb)
     except UnreadableMotion as error:

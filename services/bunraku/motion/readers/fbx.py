@@ -1,0 +1,144 @@
+"""Reader of FBX animations, binary and ASCII, by ufbx (https://github.com/ufbx/ufbx, S. Raivio)."""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+import ufbx
+
+from bunraku.motion import rotation
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.readers.node_motion import Node, NodeMotion, Track, choose_rate, sample_nodes
+from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.rotation import Array
+
+MAX_NODES = 1_000
+SPAN_TOLERANCE_S = 1e-3
+"""Keys this near to a take's span belong to it."""
+_LOAD_OPTIONS: dict[str, Any] = {
+    "file_format": ufbx.FileFormat.FBX,
+    "ignore_geometry": True,
+    "ignore_embedded": True,
+    "node_depth_limit": 256,
+}
+_BONELESS = {ufbx.ElementType.MESH, ufbx.ElementType.CAMERA, ufbx.ElementType.LIGHT}
+
+
+def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
+    """Parse the take (animation stack) `take` of an FBX file, by default the one that moves most.
+
+    Raises `UnreadableMotion` if the data is not an FBX file or has no such take. A file that crashes ufbx ends the
+    process: parse in a process of its own.
+    """
+    with _uncollected() as keep:
+        try:
+            scene = keep(ufbx.load_memory(data, **_LOAD_OPTIONS))
+        except (ufbx.UfbxError, ValueError) as error:
+            detail = str(error) or type(error).__name__
+            raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
+        stacks = list(scene.anim_stacks)
+        if not stacks:
+            raise UnreadableMotion(
+                "No animation", "the file has a model, but no animation", hint="export it with its animation"
+            )
+        key_times = [_read_key_times(stack) for stack in stacks]
+        names = [stack.name or f"take {number}" for number, stack in enumerate(stacks, 1)]
+        chosen = choose_take(names, [len(times) for times in key_times], take)
+        times = key_times[chosen]
+        if not times:
+            detail = f"the take {quote_excerpt(names[chosen])} moves nothing"
+            raise UnreadableMotion("Nothing moves", detail, field=names[chosen])
+        start, end = _find_span(stacks[chosen], times)
+        nodes, elements = _read_nodes(scene)
+        motion = sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
+        _sample_tracks(keep(stacks[chosen].anim), motion, elements)
+        return motion
+
+
+@contextmanager
+def _uncollected() -> Iterator[Callable[[Any], Any]]:
+    """Give a function that keeps an object of ufbx for ever, and exempt all objects from garbage collection.
+
+    In ufbx 0.0.5, objects do not count their references to the scene: the garbage collector and the end of an
+    animation object free memory that is in use.
+    """
+
+    def keep(item: Any) -> Any:
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(item))
+        return item
+
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield keep
+    finally:
+        gc.freeze()
+        if was_enabled:
+            gc.enable()
+
+
+def _read_key_times(stack: ufbx.AnimStack) -> list[Array]:
+    """Return the times of the keys of each curve of a take."""
+    curves = [curve for layer in stack.layers for prop in layer.anim_props for curve in prop.anim_value.curves]
+    return [
+        np.array([key.time for key in curve.keyframes])
+        for curve in curves
+        if curve is not None and len(curve.keyframes) > 0
+    ]
+
+
+def _find_span(stack: ufbx.AnimStack, key_times: Sequence[Array]) -> tuple[float, float]:
+    """Return first and last key of a take in seconds: within its own span, unless that has no keys."""
+    keys = np.unique(np.concatenate(key_times))
+    within = keys[(keys >= stack.time_begin - SPAN_TOLERANCE_S) & (keys <= stack.time_end + SPAN_TOLERANCE_S)]
+    chosen = within if len(within) > 1 else keys
+    return float(chosen[0]), float(chosen[-1])
+
+
+def _read_nodes(scene: ufbx.Scene) -> tuple[list[Node], list[ufbx.Node]]:
+    """Return the nodes that may be joints, with their ancestors, parents first, and what they are in the file."""
+    everything = list(scene.nodes)
+    parents = [-1 if node.parent is None else node.parent.typed_id for node in everything]
+    kept: set[int] = set()
+    for number, node in enumerate(everything):
+        above = -1 if node.attrib_type in _BONELESS else number
+        while above >= 0 and above not in kept:
+            kept.add(above)
+            above = parents[above]
+    if len(kept) > MAX_NODES:
+        raise UnreadableMotion("Too many joints", f"over {MAX_NODES:,} joints", hint="export the body's joints only")
+    order = sorted(kept, key=lambda number: (everything[number].node_depth, number))
+    place = {number: index for index, number in enumerate(order)}
+    nodes = []
+    for number in order:
+        name = everything[number].name or ("scene" if parents[number] < 0 else f"node {number}")
+        nodes.append(Node(name, place.get(parents[number], -1), *_as_arrays(everything[number].local_transform)))
+    return nodes, [everything[number] for number in order]
+
+
+def _sample_tracks(animation: ufbx.Anim, motion: NodeMotion, elements: Sequence[ufbx.Node]) -> None:
+    """Give each node of `motion` its transforms in all frames as tracks."""
+    times = motion.start + np.arange(motion.frame_count) / motion.fps
+    for node, element in zip(motion.nodes, elements, strict=True):
+        sampled = np.array(
+            [
+                (*each.translation, *each.rotation, *each.scale)
+                for each in (ufbx.evaluate_transform(animation, element, time) for time in times.tolist())
+            ]
+        )
+        if not np.isfinite(sampled).all():
+            raise UnreadableMotion("Broken FBX file", "its animation has values that are no numbers", field=node.name)
+        node.tracks["translation"] = Track(times, sampled[:, :3])
+        node.tracks["rotation"] = Track(times, rotation.normalise(sampled[:, [6, 3, 4, 5]]))
+        node.tracks["scale"] = Track(times, sampled[:, 7:])
+
+
+def _as_arrays(transform: ufbx.Transform) -> tuple[Array, Array, Array]:
+    """Return translation (3,), rotation (4,), w x y z, and scale (3,)."""
+    x, y, z, w = transform.rotation
+    return np.array(transform.translation), np.array([w, x, y, z]), np.array(transform.scale)

@@ -1,0 +1,216 @@
+"""Reader of glTF 2.0 animations: GLB, glTF in JSON, VRM Animation (VRMA) and VRM models with animations.
+
+Specifications: Khronos, glTF 2.0; VRM Consortium, VRM 0.0, VRMC_vrm-1.0 and VRMC_vrm_animation-1.0, whose humanoid
+bones name the nodes here.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from bunraku.motion import rotation
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.readers.gltf_file import GltfFile, broken, check_index, check_objects, parse_gltf_file
+from bunraku.motion.readers.node_motion import (
+    Interpolation,
+    Node,
+    NodeMotion,
+    Track,
+    choose_rate,
+    sample_nodes,
+)
+from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.rotation import Array
+
+MAX_NODES = 1_000
+"""Joints that are read, those that carry nothing but meshes left out."""
+COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
+_HUMANOIDS = (("VRMC_vrm_animation", "humanoid"), ("VRMC_vrm", "humanoid"), ("VRM", "humanoid"))
+
+
+def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
+    """Parse the animation `take` of an asset, by default the one that moves most nodes.
+
+    Raises `UnreadableMotion` if the data is no glTF asset or has no such animation.
+    """
+    file = parse_gltf_file(data)
+    animations = file.items("animations")
+    if not animations:
+        raise UnreadableMotion(
+            "No animation", "the file has a model, but no animation", hint="export it with its animation"
+        )
+    names = [str(animation.get("name") or f"animation {number}") for number, animation in enumerate(animations, 1)]
+    tracks = [_read_tracks(file, animation, number) for number, animation in enumerate(animations)]
+    chosen = choose_take(names, [len(moved) for moved in tracks], take)
+    nodes, kept = _read_nodes(file, tracks[chosen])
+    for node, of in tracks[chosen].items():
+        nodes[kept[node]].tracks.update(of)
+    times = [track.times for of in tracks[chosen].values() for track in of.values()]
+    if not times:
+        raise UnreadableMotion(
+            "Nothing moves", f"the animation {quote_excerpt(names[chosen])} moves no node", field=names[chosen]
+        )
+    start, end = min(float(each[0]) for each in times), max(float(each[-1]) for each in times)
+    return sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
+
+
+def _read_tracks(file: GltfFile, animation: dict[str, Any], number: int) -> dict[int, dict[str, Track]]:
+    """Return the tracks of an animation by node and property. Channels of other properties are skipped."""
+    where = f"animations[{number}]"
+    samplers = check_objects(animation.get("samplers", []), f"{where}.samplers")
+    inputs: dict[object, Array] = {}
+    found: dict[int, dict[str, Track]] = {}
+    for channel in check_objects(animation.get("channels", []), f"{where}.channels"):
+        target = channel.get("target")
+        if not isinstance(target, dict) or target.get("path") not in COMPONENTS or "node" not in target:
+            continue
+        node, path = file.check_index("nodes", target["node"]), target["path"]
+        sampler = samplers[check_index(channel.get("sampler"), samplers, f"{where}.samplers")]
+        source = sampler.get("input")
+        if source not in inputs:
+            inputs[source] = _read_times(file, source, where)
+        found.setdefault(node, {})[path] = _read_track(file, sampler, inputs[source], path, where)
+    return found
+
+
+def _read_times(file: GltfFile, index: object, where: str) -> Array:
+    times = file.read_accessor(index, 1)[:, 0]
+    if not np.isfinite(times).all() or (np.diff(times) < 0.0).any() or abs(times).max() > 1e6:
+        raise broken(where, "the times of its keys do not ascend")
+    return times
+
+
+def _read_track(file: GltfFile, sampler: dict[str, Any], times: Array, path: str, where: str) -> Track:
+    try:
+        interpolation = Interpolation(sampler.get("interpolation", Interpolation.LINEAR))
+    except ValueError as error:
+        raise broken(where, f"interpolation is {quote_excerpt(str(sampler['interpolation']))}") from error
+    values = file.read_accessor(sampler.get("output"), COMPONENTS[path])
+    per_key = 3 if interpolation is Interpolation.CUBIC else 1
+    if len(values) != per_key * len(times):
+        raise broken(where, f"a {path} has {len(times)} keys and {len(values)} values")
+    if not np.isfinite(values).all():
+        raise broken(where, f"a {path} has values that are no numbers")
+    if path == "rotation":
+        values = values[:, [3, 0, 1, 2]]
+        if interpolation is not Interpolation.CUBIC:
+            values = rotation.normalise(values)
+    return Track(times, values.reshape(len(times), 3, -1) if per_key == 3 else values, interpolation)
+
+
+def _read_nodes(file: GltfFile, tracks: dict[int, dict[str, Track]]) -> tuple[list[Node], dict[int, int]]:
+    """Return the nodes that move, carry a skin or are bones of a humanoid, with their ancestors, below one root.
+
+    Also returns the position in this list of each node of the file.
+    """
+    parents = _find_parents(file)
+    bones = _humanoid_bones(file)
+    wanted = {*tracks, *bones}
+    for number, skin in enumerate(file.items("skins")):
+        joints = skin.get("joints", [])
+        if not isinstance(joints, list):
+            raise broken(f"skins[{number}]", "joints is no list")
+        wanted.update(file.check_index("nodes", joint) for joint in joints)
+    order = _order_nodes(wanted, parents)
+    if len(order) > MAX_NODES:
+        raise UnreadableMotion(
+            "Too many joints", f"over {MAX_NODES:,} joints", field="nodes", hint="export the body's joints only"
+        )
+    roots = [index for index in order if parents[index] < 0]
+    nodes: list[Node] = []
+    kept = {-1: -1}
+    if len(roots) > 1:
+        nodes.append(Node("scene", -1, np.zeros(3), rotation.IDENTITY.copy(), np.ones(3)))
+        kept[-1] = 0
+    for index in order:
+        kept[index] = len(nodes)
+        item = file.item("nodes", index)
+        name = bones.get(index) or str(item.get("name") or f"node {index}")
+        nodes.append(Node(name, kept[parents[index]], *_rest_transform(item, index)))
+    return nodes, kept
+
+
+def _find_parents(file: GltfFile) -> list[int]:
+    """Return the parent of each node, -1 for roots; raise `UnreadableMotion` for what is no tree."""
+    items = file.items("nodes")
+    parents = [-1] * len(items)
+    for index, item in enumerate(items):
+        children = item.get("children", [])
+        if not isinstance(children, list):
+            raise broken(f"nodes[{index}]", "children is no list")
+        for child in children:
+            number = file.check_index("nodes", child)
+            if parents[number] >= 0:
+                raise broken(f"nodes[{number}]", "it has two parents")
+            parents[number] = index
+    state = [0] * len(items)
+    for index in range(len(items)):
+        path = []
+        while index >= 0 and state[index] == 0:
+            state[index] = 1
+            path.append(index)
+            index = parents[index]
+        if index >= 0 and state[index] == 1:
+            raise broken(f"nodes[{index}]", "it lies inside itself")
+        for passed in path:
+            state[passed] = 2
+    return parents
+
+
+def _order_nodes(wanted: set[int], parents: list[int]) -> list[int]:
+    """Return `wanted` and all their ancestors, parents before their children."""
+    order: dict[int, None] = {}
+    for index in sorted(wanted):
+        path = []
+        while index >= 0 and index not in order:
+            path.append(index)
+            index = parents[index]
+        order.update(dict.fromkeys(reversed(path)))
+    return list(order)
+
+
+def _humanoid_bones(file: GltfFile) -> dict[int, str]:
+    """Return the names of a VRM humanoid's bones by node."""
+    extensions = file.document.get("extensions", {})
+    for name, part in _HUMANOIDS:
+        extension = extensions.get(name) if isinstance(extensions, dict) else None
+        humanoid = extension.get(part) if isinstance(extension, dict) else None
+        bones = humanoid.get("humanBones") if isinstance(humanoid, dict) else None
+        if isinstance(bones, dict):
+            pairs = [(bone, item) for bone, item in bones.items() if isinstance(item, dict)]
+        elif isinstance(bones, list):
+            pairs = [(str(item.get("bone")), item) for item in bones if isinstance(item, dict)]
+        else:
+            continue
+        return {file.check_index("nodes", item.get("node")): bone for bone, item in pairs}
+    return {}
+
+
+def _rest_transform(item: dict[str, Any], index: int) -> tuple[Array, Array, Array]:
+    """Return translation (3,), rotation (4,) and scale (3,) of a node."""
+    where = f"nodes[{index}]"
+    if "matrix" in item:
+        matrix = _read_numbers(item["matrix"], 16, where).reshape(4, 4).T
+        scale = np.linalg.norm(matrix[:3, :3], axis=0)
+        if not (scale > 0.0).all():
+            raise broken(where, "its matrix has no inverse")
+        if np.linalg.det(matrix[:3, :3]) < 0.0:
+            scale[2] = -scale[2]
+        return matrix[:3, 3], rotation.from_matrix(matrix[:3, :3] / scale), scale
+    turn = _read_numbers(item.get("rotation", [0.0, 0.0, 0.0, 1.0]), 4, where)[[3, 0, 1, 2]]
+    if not np.linalg.norm(turn) > 0.0:
+        raise broken(where, "its rotation is zero")
+    return (
+        _read_numbers(item.get("translation", [0.0] * 3), 3, where),
+        rotation.normalise(turn),
+        _read_numbers(item.get("scale", [1.0] * 3), 3, where),
+    )
+
+
+def _read_numbers(value: object, count: int, where: str) -> Array:
+    numbers = value if isinstance(value, list) and len(value) == count else []
+    if not numbers or not all(isinstance(each, int | float) and abs(each) < 1e30 for each in numbers):
+        raise broken(where, f"its transform is not {count} numbers")
+    return np.array(numbers, dtype=np.float64)

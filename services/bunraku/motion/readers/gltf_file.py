@@ -1,0 +1,190 @@
+"""Container of glTF 2.0 assets (Khronos, glTF 2.0 specification, 4 and 5): GLB, or JSON with embedded buffers."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.rotation import Array
+
+GLB_MAGIC = b"glTF"
+MAX_JSON_ITEMS = 1_000_000
+"""Members and elements of the JSON part; a motion of an hour has a few thousand."""
+MAX_VALUES = 50_000_000
+"""Numbers of one accessor."""
+
+_HEADER = struct.Struct("<4sII")
+_CHUNK = struct.Struct("<I4s")
+_COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_REEXPORT = "export the file again, as GLB"
+_DATA_URI = "data:"
+
+
+@dataclass(slots=True)
+class GltfFile:
+    """JSON part of an asset and its first binary chunk, if it is a GLB file."""
+
+    document: dict[str, Any]
+    binary: bytes
+    _items: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    _buffers: dict[int, bytes] = field(default_factory=dict)
+
+    def items(self, name: str) -> list[dict[str, Any]]:
+        """Return the objects of an array at the top, empty if there is none."""
+        if name not in self._items:
+            self._items[name] = check_objects(self.document.get(name, []), name)
+        return self._items[name]
+
+    def item(self, name: str, index: object) -> dict[str, Any]:
+        """Return one object of an array at the top."""
+        return self.items(name)[self.check_index(name, index)]
+
+    def check_index(self, name: str, index: object) -> int:
+        """Return `index` if the array `name` at the top has it."""
+        return check_index(index, self.items(name), name)
+
+    def read_accessor(self, index: object, components: int) -> Array:
+        """Return the values (n, `components`) of an accessor; normalised integers become -1..1 or 0..1."""
+        accessor = self.item("accessors", index)
+        where = f"accessors[{index}]"
+        count, dtype = accessor.get("count"), _DTYPES.get(accessor.get("componentType", 0))
+        if _COMPONENTS.get(accessor.get("type", "")) != components or dtype is None:
+            raise broken(where, f"it has no elements of {components} numbers")
+        if isinstance(count, bool) or not isinstance(count, int) or not 0 < count <= MAX_VALUES // components:
+            raise broken(where, f"count is {quote_excerpt(str(count))}")
+        if "sparse" in accessor or "bufferView" not in accessor:
+            raise broken(where, "sparse accessors are not read")
+        values = self._read_view(accessor, np.dtype(dtype), count, components)
+        if accessor.get("normalized") is True and values.dtype.kind != "f":
+            scaled = values / float(np.iinfo(values.dtype).max)
+            return np.maximum(scaled, -1.0)
+        return values.astype(np.float64)
+
+    def _read_view(
+        self, accessor: dict[str, Any], dtype: np.dtype[Any], count: int, components: int
+    ) -> np.ndarray[Any, Any]:
+        """Return the values (n, `components`) of an accessor as they are stored."""
+        view = self.item("bufferViews", accessor["bufferView"])
+        where = f"bufferViews[{accessor['bufferView']}]"
+        if "EXT_meshopt_compression" in view.get("extensions", {}):
+            raise UnreadableMotion(
+                "Compressed file",
+                "its animation is compressed with EXT_meshopt_compression",
+                field=where,
+                hint="export it without compression (gltfpack: -noq, without -c)",
+            )
+        buffer = self._read_buffer(view.get("buffer", 0))
+        width = components * dtype.itemsize
+        start, length, stride = (
+            _whole(view, "byteOffset", 0, where),
+            _whole(view, "byteLength", 0, where),
+            _whole(view, "byteStride", width, where),
+        )
+        offset = _whole(accessor, "byteOffset", 0, where)
+        if stride < width or start + length > len(buffer) or offset + (count - 1) * stride + width > length:
+            raise broken(where, f"{count} elements of {width} bytes reach beyond its data")
+        raw = np.frombuffer(buffer, np.uint8, (count - 1) * stride + width, start + offset)
+        rows = np.lib.stride_tricks.as_strided(raw, (count, width), (stride, 1), writeable=False)
+        return np.ascontiguousarray(rows).view(dtype)
+
+    def _read_buffer(self, index: object) -> bytes:
+        number = self.check_index("buffers", index)
+        uri = self.item("buffers", number).get("uri")
+        if uri is None:
+            return self.binary
+        if (known := self._buffers.get(number)) is not None:
+            return known
+        if not isinstance(uri, str) or not uri.startswith(_DATA_URI):
+            raise UnreadableMotion(
+                "Not one file",
+                f"its data is in another file, {quote_excerpt(str(uri))}",
+                field=f"buffers[{index}]",
+                hint="export it as GLB, or with embedded buffers",
+            )
+        try:
+            decoded = self._buffers[number] = base64.b64decode(uri.partition(",")[2], validate=True)
+        except binascii.Error as error:
+            raise broken(f"buffers[{index}]", "its data is not Base64") from error
+        return decoded
+
+
+def parse_gltf_file(data: bytes) -> GltfFile:
+    """Parse a GLB file, or a glTF file in JSON. Raises `UnreadableMotion`."""
+    text, binary = (data, b"") if not data.startswith(GLB_MAGIC) else _split_chunks(data)
+    if text.count(b",") + text.count(b"[") + text.count(b"{") > MAX_JSON_ITEMS:
+        raise UnreadableMotion(
+            "Too large",
+            f"its JSON part has over {MAX_JSON_ITEMS:,} items",
+            hint="export the skeleton and its motion only",
+        )
+    try:
+        document = json.loads(text.decode("utf-8-sig"))
+    except (UnicodeDecodeError, ValueError, RecursionError) as error:
+        line = error.lineno if isinstance(error, json.JSONDecodeError) else None
+        raise UnreadableMotion("Not a glTF file", "its JSON part is broken", line=line, hint=_REEXPORT) from error
+    asset = document.get("asset") if isinstance(document, dict) else None
+    version = asset.get("version") if isinstance(asset, dict) else None
+    if not isinstance(version, str) or not version.startswith("2."):
+        raise UnreadableMotion(
+            "Not a glTF 2 file", f"its version is {quote_excerpt(str(version))}", field="asset.version", hint=_REEXPORT
+        )
+    return GltfFile(document, binary)
+
+
+def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
+    """Return the JSON and binary chunks of a GLB file."""
+    if len(data) < _HEADER.size + _CHUNK.size:
+        raise UnreadableMotion("Cut short", "the file ends in its header", hint=_REEXPORT)
+    _, version, length = _HEADER.unpack_from(data)
+    if version != 2:
+        raise UnreadableMotion("Not a glTF 2 file", f"its version is {version}", hint=_REEXPORT)
+    if length > len(data):
+        raise UnreadableMotion(
+            "Cut short", f"the file says it has {length:,} bytes, but {len(data):,} are there", hint="send it again"
+        )
+    chunks: dict[bytes, bytes] = {}
+    position = _HEADER.size
+    while position + _CHUNK.size <= length:
+        size, kind = _CHUNK.unpack_from(data, position)
+        position += _CHUNK.size
+        if position + size > length:
+            raise broken("chunks", "a chunk reaches beyond the file")
+        chunks.setdefault(kind, data[position : position + size])
+        position += size + -size % 4
+    if b"JSON" not in chunks:
+        raise broken("chunks", "there is no JSON chunk")
+    return chunks[b"JSON"], chunks.get(b"BIN\0", b"")
+
+
+def check_objects(value: object, name: str) -> list[dict[str, Any]]:
+    """Return `value` if it is a list of objects."""
+    if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
+        raise broken(name, "it is no list of objects")
+    return value
+
+
+def check_index(index: object, items: list[Any], name: str) -> int:
+    """Return `index` if the array `items` has it."""
+    if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(items):
+        raise broken(name, f"there is no number {quote_excerpt(str(index))}")
+    return index
+
+
+def broken(field: str, detail: str) -> UnreadableMotion:
+    """Return the error of an asset that contradicts the specification."""
+    return UnreadableMotion("Broken glTF file", detail, field=field, hint=_REEXPORT)
+
+
+def _whole(item: dict[str, Any], name: str, default: int, where: str) -> int:
+    value = item.get(name, default)
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < 1 << 32:
+        raise broken(where, f"{name} is {quote_excerpt(str(value))}")
+    return value

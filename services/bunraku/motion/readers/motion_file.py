@@ -1,0 +1,81 @@
+"""Reading of a motion file by its content, whatever it is called."""
+
+from __future__ import annotations
+
+import posixpath
+import re
+from dataclasses import replace
+
+from bunraku.motion.bvh import Bvh, parse_bvh
+from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers.acclaim import parse_amc, parse_asf
+from bunraku.motion.readers.archive import MOTION_SUFFIXES, ZIP_MAGIC, Archive
+from bunraku.motion.readers.fbx import parse_fbx
+from bunraku.motion.readers.gltf import parse_gltf
+from bunraku.motion.readers.gltf_file import GLB_MAGIC
+from bunraku.motion.readers.node_motion import NodeMotion
+from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.source_motion import SampledMotion
+
+AnyMotion = Bvh | NodeMotion | SampledMotion
+
+FBX_MAGIC = b"Kaydara FBX Binary"
+C3D_PARAMETERS, C3D_MAGIC = range(2, 64), 0x50
+"""First bytes of a C3D file: the block of its parameters, and a constant."""
+START_BYTES = 4096
+"""Bytes at the beginning of a file that show what it is."""
+_ASCII_FBX = re.compile(rb"^\s*(;\s*FBX|FBXHeaderExtension\s*:)", re.MULTILINE)
+_AMC = re.compile(rb"^\s*(:FULLY-SPECIFIED|:DEGREES|:RADIANS|#!OML:ASF)", re.MULTILINE | re.IGNORECASE)
+_ASF = re.compile(rb"^\s*:(bonedata|hierarchy|units|version|root)\b", re.MULTILINE | re.IGNORECASE)
+
+
+def read_motion(data: bytes, take: str | None = None) -> AnyMotion:
+    """Parse a motion file: BVH, FBX, glTF, VRM, VRMA, or a zip archive of such files or of ASF and AMC.
+
+    `take` chooses an animation of a file, or a file of an archive, by its name. Raises `UnreadableMotion`.
+    """
+    start = data[:START_BYTES]
+    if start.startswith(ZIP_MAGIC):
+        return _read_archive(Archive(data), take)
+    if start.startswith(GLB_MAGIC) or start.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        return parse_gltf(data, take)
+    if start.startswith(FBX_MAGIC) or _ASCII_FBX.search(start):
+        return parse_fbx(data, take)
+    if len(start) > 1 and start[0] in C3D_PARAMETERS and start[1] == C3D_MAGIC:
+        raise UnreadableMotion(
+            "Markers, not joints",
+            "C3D files have the positions of markers",
+            hint="solve a skeleton in the capture software, and export it as FBX or BVH",
+        )
+    if _AMC.search(start):
+        raise UnreadableMotion(
+            "Motion without skeleton", "an AMC file has no skeleton", hint="send it with its ASF file, in a zip archive"
+        )
+    if _ASF.search(start):
+        raise UnreadableMotion(
+            "Skeleton without motion", "an ASF file has no motion", hint="send it with its AMC file, in a zip archive"
+        )
+    return parse_bvh(data)
+
+
+def _read_archive(archive: Archive, take: str | None) -> AnyMotion:
+    """Read one motion of an archive: the one called `take`, by path or file name, or the largest."""
+    paths = archive.names(*MOTION_SUFFIXES)
+    if not paths:
+        raise UnreadableMotion(
+            "No motion",
+            "the archive has no motion file",
+            hint="pack BVH, FBX, GLB or VRMA files, or AMC files with their ASF",
+        )
+    names = [posixpath.basename(path) for path in paths]
+    labels = names if len(set(names)) == len(names) else paths
+    chosen = choose_take(labels, [archive.size(path) for path in paths], take)
+    path = paths[chosen]
+    if path.lower().endswith(".amc"):
+        motion: AnyMotion = parse_amc(archive.read(path), parse_asf(archive.read(archive.find_skeleton(path))))
+    else:
+        data = archive.read(path)
+        if data.startswith(ZIP_MAGIC):
+            raise UnreadableMotion("Archive in an archive", "it is not opened", field=path, hint="unpack it first")
+        motion = read_motion(data)
+    return replace(motion, notes=(*motion.notes, *describe_choice(labels, chosen)))
