@@ -58,7 +58,7 @@ help:
 	@$(BIN)/python services/web/compress_page.py services/bunraku/page
 	@touch $@
 
-.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py services/bunraku/marionette/solver/*.py) proto/prior.json proto/constants.json
+.setup/warm: .setup/python $(wildcard services/bunraku/*/_kernels.py services/bunraku/motion/readers/_kernels.py services/bunraku/codec/*.py services/bunraku/codec/_kernels/*.py services/bunraku/marionette/*.py services/bunraku/marionette/solver/*.py) proto/prior.json proto/constants.json
 	@echo "setup: compiling the kernels of reader, codec and limb solver"
 	@$(BIN)/bunraku warm
 	@touch $@

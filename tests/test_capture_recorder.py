@@ -17,7 +17,7 @@ from bunraku.capture.session import TimedPose
 from bunraku.capture.vmc import VmcAssembler
 from bunraku.capture_recorder import CaptureReceiver, describe_capture, explain_empty_take
 from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh import parse_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.skeleton import joint_and_tip_positions
 from tests.capture.capture_process import FPS, make_packet, run_capture, send_packets
 from tests.processes import free_port

@@ -17,8 +17,8 @@ from bunraku.capture.session import TimedPose
 from bunraku.capture_recorder import STATUS_INTERVAL_S, print_stage_address
 from bunraku.capture_stream import MAX_STREAM_FPS, PerformanceStream, StreamOptions
 from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.skeleton import Motion
 from bunraku.terminal import call_when_stopped, err, print_statistics, run_request
 

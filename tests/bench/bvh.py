@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.bvh_writer import write_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.rotation import from_rotation_vector
 from bunraku.motion.skeleton import JOINT_COUNT, Motion, standard_figure
 

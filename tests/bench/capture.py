@@ -17,7 +17,7 @@ from bunraku.capture.reorder import ReorderBuffer
 from bunraku.capture.retarget import Retargeter
 from bunraku.capture.vmc import VmcAssembler
 from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh import parse_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from tests.capture.samples import joint_distances_mm
 from tests.capture.vmc_performer import make_bundle, make_messages, perform
 

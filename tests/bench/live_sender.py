@@ -13,7 +13,7 @@ import threading
 import time
 from pathlib import Path
 
-from bunraku.motion.bvh import parse_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from tests.capture.network_faults import Arrival, Faults, simulate_arrivals
 from tests.capture.vmc_performer import make_bundle, make_message, make_messages, perform
 

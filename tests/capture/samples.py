@@ -13,7 +13,7 @@ from bunraku.capture.retarget import Pose, Retargeter
 from bunraku.capture.vmc import VmcAssembler
 from bunraku.motion import rotation
 from bunraku.motion.analysis import Analysis, analyse
-from bunraku.motion.bvh import Bvh, parse_bvh
+from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.skeleton import JOINT_INDEX, Figure, world_transforms
 from tests.capture.vmc_performer import Performance, make_bundle, make_messages, perform
 from tests.motion.synthetic_motion import export_bvh, pose_with_arms, smooth_motion

@@ -14,7 +14,7 @@ from bunraku.capture.vmc import VmcAssembler
 from bunraku.marionette.solver.vector import about_z, multiply
 from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh import parse_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from tests.capture.samples import joint_distances_mm, sample_frames
 from tests.capture.vmc_performer import make_bundle, make_messages, perform
 

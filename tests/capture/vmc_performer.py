@@ -16,8 +16,8 @@ from pythonosc.osc_message_builder import OscMessageBuilder
 
 from bunraku.motion import rotation
 from bunraku.motion.analysis import SourceFit, fit_source
-from bunraku.motion.bvh import Bvh, parse_bvh
 from bunraku.motion.joint_tree import ancestor_chain, common_ancestor
+from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, Motion
 from bunraku.motion.source_motion import SourceMotion

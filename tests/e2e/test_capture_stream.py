@@ -14,8 +14,8 @@ import pytest
 
 from bunraku.client import Client, Viewer
 from bunraku.http.access_control import Role
-from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.bvh_writer import write_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure, world_transforms
 from bunraku.playout.block_store import Pose

@@ -23,7 +23,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(0.5))
     shares: list[float] = []
-    result = await job_process.run_job(JobKind.MOTION, ("m1", source), HANG_TIMEOUT_S, shares.append)
+    result = await job_process.run_job(JobKind.MOTION, ("m1", source, None), HANG_TIMEOUT_S, shares.append)
     assert isinstance(result, JobResult)
     assert result.description["frames"] == 15
     assert shares == sorted(set(shares))
@@ -32,7 +32,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
 
 
 async def test_crashed_job_is_a_rejection(tmp_path: Path) -> None:
-    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing"), HANG_TIMEOUT_S)
+    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing", None), HANG_TIMEOUT_S)
     assert isinstance(result, JobRejection)
     assert result.hint
 
@@ -42,7 +42,7 @@ async def test_cancelled_job_is_killed(tmp_path: Path) -> None:
     source.write_bytes(make_bvh_clip(60.0))
     encoding = asyncio.Event()
     job = asyncio.create_task(
-        job_process.run_job(JobKind.MOTION, ("m1", source), HANG_TIMEOUT_S, lambda _: encoding.set())
+        job_process.run_job(JobKind.MOTION, ("m1", source, None), HANG_TIMEOUT_S, lambda _: encoding.set())
     )
     await encoding.wait()
     job.cancel()
@@ -54,7 +54,7 @@ async def test_cancelled_job_is_killed(tmp_path: Path) -> None:
 async def test_job_is_killed_at_its_time_limit(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(20.0))
-    rejected = await job_process.run_job(JobKind.MOTION, ("m1", source), 0.001)
+    rejected = await job_process.run_job(JobKind.MOTION, ("m1", source, None), 0.001)
     assert isinstance(rejected, JobRejection)
     assert "long" in rejected.title
 

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bunraku.motion import bvh, rotation
+from bunraku.motion import rotation
 from bunraku.motion.analysis import Analysis, analyse
 from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers import bvh
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Figure, Motion, joint_and_tip_positions, world_transforms
 from tests.motion.synthetic_motion import bone_aligned, export_bvh, pose_with_arms, smooth_motion, straight_figure

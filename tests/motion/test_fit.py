@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bunraku.motion import bvh, rotation
+from bunraku.motion import rotation
 from bunraku.motion.fit import FigureFit
+from bunraku.motion.readers import bvh
 from bunraku.motion.rest_pose import find_rest_pose, sample_frames
 from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
 from tests.motion.synthetic_motion import export_bvh, pose_with_arms, smooth_motion

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.motion.bvh_hierarchy import parse_hierarchy
 from bunraku.motion.joint_name import split_words
 from bunraku.motion.name_mapping import JointMapping, find_head_by_name, map_by_name
 from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
+from bunraku.motion.readers.bvh_hierarchy import parse_hierarchy
 
 LIMBS = [f"{side}_{joint}" for side in "lr" for joint in LIMB_JOINT_NAMES]
 """The order of the expected names below: left leg, left arm, right leg, right arm."""

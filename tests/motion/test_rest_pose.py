@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.motion import bvh, rotation
+from bunraku.motion import rotation
 from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
+from bunraku.motion.readers import bvh
 from bunraku.motion.rest_pose import METRES_PER_UNIT, RestPose, find_rest_pose, resolve_sides, sample_frames
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Motion

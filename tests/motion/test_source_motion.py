@@ -2,8 +2,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from bunraku.motion import bvh, rotation
+from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
+from bunraku.motion.readers import bvh
 from bunraku.motion.skeleton import JOINT_COUNT
 from bunraku.motion.source_motion import SampledMotion, SourceMotion, bone_lengths, chain_transforms
 from tests.motion.synthetic_motion import export_bvh, smooth_motion

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bunraku.motion import bvh
 from bunraku.motion.analysis import analyse
 from bunraku.motion.fit import FigureFit
+from bunraku.motion.readers import bvh
 from bunraku.motion.rest_pose import find_rest_pose, sample_frames
 from bunraku.motion.skeleton import JOINT_INDEX, world_transforms
 from bunraku.motion.trunk_fit import CROWN_OFFSET_M, fit_trunk

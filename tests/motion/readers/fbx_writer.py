@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.bvh import parse_bvh
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.rotation import Array
 from tests.motion.readers.sources import local_transforms
 from tests.motion.synthetic_motion import export_bvh, smooth_motion

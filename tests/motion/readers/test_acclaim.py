@@ -3,8 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bunraku.motion import bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers import bvh
 from bunraku.motion.readers.acclaim import parse_amc, parse_asf
 from tests.motion.readers.sources import write_acclaim
 from tests.motion.synthetic_motion import export_bvh, smooth_motion

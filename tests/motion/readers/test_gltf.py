@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bunraku.motion import bvh
 from bunraku.motion.analysis import analyse
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers import bvh
 from bunraku.motion.readers.gltf import parse_gltf
 from tests.motion.readers.sources import pack_glb, unpack_glb, write_glb
 from tests.motion.synthetic_motion import export_bvh, smooth_motion

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from bunraku.motion.analysis import Analysis, analyse
-from bunraku.motion.bvh import Bvh, parse_bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.skeleton import world_transforms
 from tests.motion.readers.sources import write_acclaim, write_glb, write_zip

@@ -12,8 +12,8 @@ from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import analyse
-from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.readers.motion_file import read_motion
 
 _MINIMAL_BVH = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"

@@ -6,10 +6,10 @@ import posixpath
 import re
 from dataclasses import replace
 
-from bunraku.motion.bvh import Bvh, parse_bvh
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.readers.acclaim import parse_amc, parse_asf
 from bunraku.motion.readers.archive import MOTION_SUFFIXES, ZIP_MAGIC, Archive
+from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.readers.fbx import parse_fbx
 from bunraku.motion.readers.gltf import parse_gltf
 from bunraku.motion.readers.gltf_file import GLB_MAGIC

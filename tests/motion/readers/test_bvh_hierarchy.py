@@ -1,8 +1,8 @@
 import pytest
 
-from bunraku.motion.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, parse_hierarchy
 from bunraku.motion.errors import UnreadableMotion
-from tests.motion.bvh_samples import HIERARCHY_TEXT, MOTION_LINE
+from bunraku.motion.readers.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, parse_hierarchy
+from tests.motion.readers.bvh_samples import HIERARCHY_TEXT, MOTION_LINE
 
 HIERARCHY_WITH_MOTION = HIERARCHY_TEXT + b"MOTION\n"
 

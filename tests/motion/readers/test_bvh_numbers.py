@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.motion.bvh_numbers import (
+from bunraku.motion.readers.bvh_numbers import (
     DECIMAL_COMMA,
     NO_COMMA,
     SEPARATING_COMMA,

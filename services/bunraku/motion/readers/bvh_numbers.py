@@ -39,10 +39,10 @@ def parse_numbers(data: ByteArray, count: int, comma: int) -> tuple[Array, int]:
     `comma` is the role of commas: `NO_COMMA` (invalid), `DECIMAL_COMMA` or `SEPARATING_COMMA`.
     """
     out = np.empty(count)
-    bad: int = load_kernels("motion").parse_numbers(data, comma, POWERS_OF_TEN, out)
+    bad: int = load_kernels("motion.readers").parse_numbers(data, comma, POWERS_OF_TEN, out)
     return out, bad
 
 
 def measure_lines(data: ByteArray, comma: int, channel_count: int) -> LineStatistics:
     """Return the distribution of words in `data` (line feeds) for frames of `channel_count` values."""
-    return LineStatistics(*load_kernels("motion").count_words(data, comma, channel_count))
+    return LineStatistics(*load_kernels("motion.readers").count_words(data, comma, channel_count))

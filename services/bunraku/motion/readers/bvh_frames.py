@@ -7,7 +7,8 @@ import re
 
 import numpy as np
 
-from bunraku.motion.bvh_numbers import (
+from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.readers.bvh_numbers import (
     DECIMAL_COMMA,
     NO_COMMA,
     SEPARATING_COMMA,
@@ -15,7 +16,6 @@ from bunraku.motion.bvh_numbers import (
     measure_lines,
     parse_numbers,
 )
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.rotation import Array
 
 DEFAULT_FRAME_TIME_S = 1.0 / 30.0

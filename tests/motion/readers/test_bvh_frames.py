@@ -1,8 +1,8 @@
 import pytest
 
-from bunraku.motion.bvh import parse_bvh
 from bunraku.motion.errors import UnreadableMotion
-from tests.motion.bvh_samples import FIRST_FRAME_LINE, HIERARCHY_TEXT, ROWS, VALUES, motion_section
+from bunraku.motion.readers.bvh import parse_bvh
+from tests.motion.readers.bvh_samples import FIRST_FRAME_LINE, HIERARCHY_TEXT, ROWS, VALUES, motion_section
 
 INCOMPLETE_ROW = b"1 2 3 4 5 6 7 8"
 

@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.motion import rotation
-from bunraku.motion.bvh_frames import parse_frames
-from bunraku.motion.bvh_hierarchy import parse_hierarchy
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.joint_tree import ancestor_chain
+from bunraku.motion.readers.bvh_frames import parse_frames
+from bunraku.motion.readers.bvh_hierarchy import parse_hierarchy
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import EndSite
 

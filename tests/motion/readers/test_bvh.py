@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bunraku.motion.bvh import Bvh, parse_bvh
 from bunraku.motion.bvh_writer import write_bvh
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.rotation import from_rotation_vector
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, Motion, standard_figure, world_transforms
-from tests.motion.bvh_samples import HIERARCHY_TEXT, MINIMAL_BVH, ROWS, VALUES, motion_section
+from tests.motion.readers.bvh_samples import HIERARCHY_TEXT, MINIMAL_BVH, ROWS, VALUES, motion_section
 
 
 @pytest.mark.parametrize(
