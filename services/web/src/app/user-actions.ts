@@ -1,11 +1,11 @@
 /** Actions of the page's controls and of its keys, as functions of the application's parts. */
+
 import { pageAccess } from "../client/access";
 import { recordSession } from "../client/api";
 import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
-import { isAvatarFile } from "../ui/library/avatar-chooser";
 import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem, uploadAll } from "../ui/library/upload";
 import type { Page, UserActions } from "../ui/page";
@@ -14,6 +14,7 @@ import { createRecordAction, type KeptMotionActions, showKept } from "../ui/tran
 import type { AvatarSlots } from "./avatar-slot";
 import { addMotionToStage } from "./cast";
 import type { Exporter } from "./exporter";
+import { findFileKind } from "./file-kind";
 import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
 import type { PlaybackController } from "./playback-controller";
@@ -55,7 +56,7 @@ export function createUserActions(app: AppParts): UserActions {
     camera: () => app.stageHost.toggleCamera(),
     sound: () => app.soundController.toggle(),
     volume: (volume) => (app.soundController.volume = volume),
-    files: (files) => openFiles(app, files),
+    files: (files) => void openFiles(app, files),
     avatar: (file) => void app.avatarSlots.selected.load(file),
     danceAs: (avatar) => app.avatarSlots.selected.setActive(avatar),
     removeAvatar: () => void app.avatarSlots.selected.remove(),
@@ -122,12 +123,13 @@ export function createKeyActions(app: AppParts): PageActions {
 }
 
 /** Load the last avatar file of these, and upload all motion files if this page may. */
-function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly File[]): void {
-  const avatar = files.findLast(isAvatarFile);
+async function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly File[]): Promise<void> {
+  const kinds = await Promise.all(files.map(findFileKind));
+  const avatar = files.findLast((_, index) => kinds[index] === "avatar");
   if (avatar) void avatarSlots.selected.load(avatar);
-  const motions = pageAccess.allows("ingest") ? files.filter((file) => !isAvatarFile(file)) : [];
+  const motions = pageAccess.allows("ingest") ? files.filter((_, index) => kinds[index] === "motion") : [];
   if (avatar || motions.length > 0) page.panels.open("library");
-  void uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
+  await uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
 }
 
 function webcamStage(app: AppParts): WebcamStage {

@@ -101,7 +101,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   Library: "演目",
   "Close {panel}": "{panel}を閉じる",
   "Drop a dance here": "ここに踊りをドロップ",
-  "motion .bvh, up to 64 MB, or press to choose": "BVHファイル、64 MBまで。押して選択",
+  "motion .bvh, .fbx, .glb, .vrma or .zip, up to 64 MB, or press to choose":
+    "BVH、FBX、GLB、VRMA、ZIPファイル、64 MBまで。押して選択",
   "Drop a dance, or an avatar to dance as": "踊りか、踊らせるアバターをドロップ",
   // live performers
   "Perform live": "生で踊る",

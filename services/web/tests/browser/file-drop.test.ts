@@ -1,5 +1,7 @@
 /** Files dropped on the page. */
 import { expect, test } from "vitest";
+import { writeVrma } from "../../src/export/vrma";
+import { goldenMotion, joinParts, runToCompletion } from "../export/motions";
 import { describeInBrowser } from "./browser-suite";
 import { createBowingBvh } from "./bvh-file";
 
@@ -21,12 +23,31 @@ describeInBrowser("file drop", { server: "open" }, ({ open }) => {
     );
     expect(stored.items.map(({ filename }) => filename)).toContain("dropped.bvh");
   });
+
+  test("a GLB file with an animation is a motion, not an avatar", async () => {
+    const file = new Uint8Array(await joinParts(runToCompletion(writeVrma(goldenMotion(), "waltz"))));
+    const page = await open("", { viewport: { width: 390, height: 700 }, reducedMotion: "reduce" });
+    await page.getByRole("button", { name: "Library", exact: true }).waitFor();
+    await page.evaluate(dispatchDrag, { type: "drop", name: "waltz.glb", bytes: [...file] });
+    await page.locator(".brand-piece", { hasText: "waltz" }).waitFor({ state: "attached" });
+    expect(await page.locator(".problem").count()).toBe(0);
+  });
 });
 
 /** In the page: dispatch a drag event with a file on the stage. */
-function dispatchDrag({ type, name, text }: { type: string; name: string; text: string }): void {
+function dispatchDrag({
+  type,
+  name,
+  text,
+  bytes,
+}: {
+  type: string;
+  name: string;
+  text?: string;
+  bytes?: number[];
+}): void {
   const dataTransfer = new DataTransfer();
-  dataTransfer.items.add(new File([text], name));
+  dataTransfer.items.add(new File([text ?? new Uint8Array(bytes ?? [])], name));
   const event = new DragEvent(type, { dataTransfer, bubbles: true, cancelable: true });
   document.querySelector("#stage")?.dispatchEvent(event);
   if (!event.defaultPrevented) throw new Error(`The page did not handle ${type}: the browser would open the file`);

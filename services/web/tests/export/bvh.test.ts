@@ -29,8 +29,7 @@ test.each([
 const PYTHON = `
 import json, sys
 import numpy as np
-from bunraku.motion.bvh import parse_bvh
-from bunraku.motion.bvh_kinematics import forward_kinematics
+from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.placement import Placement
 from bunraku.motion.skeleton import JOINTS, Figure, Motion
 from bunraku.motion.bvh_writer import write_bvh
@@ -43,7 +42,7 @@ rotations = np.array(request["rotations"]).reshape(frames, 18, 4)
 motion = Motion(figure, request["fps"], *placement.apply(roots, rotations))
 parsed = parse_bvh(request["text"].encode())
 order = [parsed.names.index(name) for name in JOINTS]
-positions, _ = forward_kinematics(parsed, order)
+positions, _ = parsed.world_transforms(order)
 result = {"fps": parsed.fps, "places": positions[:, order].ravel().tolist(), "text": write_bvh(motion).decode()}
 json.dump(result, sys.stdout)
 `;

@@ -5,8 +5,6 @@ import { icon } from "../icon";
 import type { LimbState } from "../limb-state";
 import { createPerformerChooser } from "../strings/performer-chooser";
 
-/** File names that are treated as avatars, and the types that the file chooser offers. */
-const AVATAR_FILE_NAME = /\.(?:vrm|glb|gltf)$/i;
 const AVATAR_FILE_TYPES = ".vrm,.glb";
 
 export interface AvatarActions {
@@ -37,11 +35,6 @@ export interface AvatarChooser {
 }
 
 const PUPPET_STATE: AvatarState = { name: null, active: false, loadingFile: null };
-
-/** Return whether a file is an avatar rather than a motion, by its extension. */
-export function isAvatarFile(file: File): boolean {
-  return AVATAR_FILE_NAME.test(file.name);
-}
 
 export function createAvatarChooser(actions: AvatarActions): AvatarChooser {
   const picker = element("input", { type: "file", accept: AVATAR_FILE_TYPES, hidden: true });

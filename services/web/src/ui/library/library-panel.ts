@@ -54,7 +54,7 @@ export interface LibraryActions extends AvatarActions {
   close(): void;
 }
 
-export const ACCEPTED_FILE_TYPES = ".bvh,.vrm,.glb";
+export const ACCEPTED_FILE_TYPES = ".bvh,.fbx,.glb,.gltf,.vrma,.zip,.vrm";
 
 export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): LibraryPanel {
   const panel = createPanel(root, "library", translate("Library"), actions.close);
@@ -69,7 +69,9 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
     icon("upload"),
     element("b", {}, translate("Drop a dance here")),
   );
-  drop.append(element("span", {}, translate("motion .bvh, up to 64 MB, or press to choose")));
+  drop.append(
+    element("span", {}, translate("motion .bvh, .fbx, .glb, .vrma or .zip, up to 64 MB, or press to choose")),
+  );
   const transfers = element("div", { role: "group", "aria-label": translate("Uploads and downloads") });
   const alert = element("div", { role: "alert" });
   const list = element("ul", { class: "motions" });
