@@ -24,6 +24,7 @@ from bunraku.cli_access import (
 )
 from bunraku.cli_bench import bench
 from bunraku.cli_capture import capture
+from bunraku.cli_inspect import inspect
 from bunraku.cli_send import send
 from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
@@ -48,6 +49,7 @@ app = typer.Typer(
 )
 app.command()(token)
 app.command()(share)
+app.command()(inspect)
 app.add_typer(bench, name="bench")
 app.add_typer(capture, name="capture")
 app.add_typer(send, name="send")

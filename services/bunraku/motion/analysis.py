@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -38,6 +39,13 @@ CALIBRATION_POSE_LIMITS = (0.05, 4.0)
 and exceeds the largest later step by the second limit, a factor."""
 
 
+class JointFit(NamedTuple):
+    """Index of the source joint that a joint of the figure follows, and their mean distance in millimetres."""
+
+    source: int
+    mean_mm: float
+
+
 @dataclass(frozen=True, slots=True)
 class Analysis:
     """Result of the analysis of a source.
@@ -45,7 +53,7 @@ class Analysis:
     `motion` has the source's frame rate; `profile` is the naming convention ("shape": none matched); `source_joints`
     maps H-Anim joints to source joints; `rest_pose` is "T", "A", "I", "bone-aligned" or "other"; `unit` the unit of
     length; `assumptions` are sentences for the uploader. Fit errors are distances between the figure's joints and the
-    source's, over all mapped joints and frames, in millimetres.
+    source's, over all mapped joints and frames, in millimetres; `joint_fits` has each joint's.
     """
 
     motion: Motion
@@ -56,6 +64,7 @@ class Analysis:
     assumptions: list[str]
     mean_fit_error_mm: float
     max_fit_error_mm: float
+    joint_fits: dict[str, JointFit]
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +116,10 @@ def analyse(source: SourceMotion) -> Analysis:
         assumptions=fitted.assumptions,
         mean_fit_error_mm=float(apart.mean()),
         max_fit_error_mm=float(apart.max()),
+        joint_fits={
+            JOINTS[joint]: JointFit(fit.joints[joint], mean)
+            for joint, mean in zip(mapped, apart.mean(axis=0).tolist(), strict=True)
+        },
     )
 
 
