@@ -87,6 +87,8 @@ const PREFERENCES = {
   // Fewer processes start faster.
   "dom.ipc.processPrelaunch.enabled": false,
   "fission.autostart": false,
+  // A speaker within Firefox, which no server can keep waiting. Firefox 140 ignores this and uses the other one.
+  "media.cubeb.force_mock_context": true,
   "browser.download.folderList": 2,
   // The list of downloads would take the focus of the page, and its keys.
   "browser.download.alwaysOpenPanel": false,
