@@ -82,7 +82,7 @@ test-python: setup
 # a million steps of the merge against its model, about fifteen minutes, 10,000 simulations, about an hour, and a million
 # inputs for each reader of live capture and for the input socket of performers, about an hour
 test-nightly: setup
-	BUNRAKU_FUZZ_RUNS=1000000 $(BIN)/pytest tests/fuzz/test_capture_targets.py
+	BUNRAKU_FUZZ_RUNS=1000000 $(BIN)/pytest tests/fuzz/test_capture_targets.py tests/fuzz/test_reader_targets.py
 	BUNRAKU_MERGE_STEPS=1000000 $(BIN)/pytest --timeout=7200 tests/marionette/test_merge_model.py
 	BUNRAKU_SIMULATION_SEEDS=10000 $(BIN)/pytest --numprocesses $$(getconf _NPROCESSORS_ONLN) tests/simulation
 

@@ -1,9 +1,9 @@
 """Coverage-guided fuzzing in a separate process: `python -m tests.fuzz GROUP CORPUS COUNTS [options of libFuzzer]`.
 
-GROUP is "contract", whose inputs select the target by their first byte, or the name of one target of `capture_targets`.
-The Python code of the packages is instrumented. Compiled code cannot be, but its bounds are checked if
-NUMBA_BOUNDSCHECK=1. The file COUNTS holds an int64 for each target and outcome (rejected, accepted). A failure ends the
-process with its traceback on stdout and the bytes of the input on stderr.
+GROUP is "contract", whose inputs select the target by their first byte, or the name of one target of `capture_targets`
+or `reader_targets`. The Python code of the packages is instrumented. Compiled code cannot be, but its bounds are
+checked if NUMBA_BOUNDSCHECK=1. The file COUNTS holds an int64 for each target and outcome (rejected, accepted). A
+failure ends the process with its traceback on stdout and the bytes of the input on stderr.
 """
 
 from __future__ import annotations
@@ -47,14 +47,36 @@ CAPTURE = [
     "tests.fuzz.capture_targets",
     "tests.fuzz.performer_input",
 ]
+READERS = [
+    "bunraku.motion.readers.acclaim",
+    "bunraku.motion.readers.archive",
+    "bunraku.motion.readers.bvh",
+    "bunraku.motion.readers.bvh_frames",
+    "bunraku.motion.readers.bvh_hierarchy",
+    "bunraku.motion.readers.gltf",
+    "bunraku.motion.readers.gltf_file",
+    "bunraku.motion.readers.motion_file",
+    "bunraku.motion.readers.node_motion",
+    "tests.fuzz.reader_targets",
+    "zipfile",
+]
+READER_GROUPS = ("bvh", "gltf", "acclaim", "archive")
 
 
 def main() -> None:
     group, corpus, file, *options = sys.argv[1:]
     if group == "contract":
-        import bunraku.codec._kernels  # noqa: F401 - compiled code, imported before the instrumentation starts
-    with atheris.instrument_imports(include=CONTRACT if group == "contract" else CAPTURE, enable_loader_override=False):
-        module = import_module("tests.fuzz.targets" if group == "contract" else "tests.fuzz.capture_targets")
+        import bunraku.codec._kernels
+
+        modules, name = CONTRACT, "targets"
+    elif group in READER_GROUPS:
+        import bunraku.motion.readers._kernels  # noqa: F401
+
+        modules, name = READERS, "reader_targets"
+    else:
+        modules, name = CAPTURE, "capture_targets"
+    with atheris.instrument_imports(include=modules, enable_loader_override=False):
+        module = import_module(f"tests.fuzz.{name}")
     targets, seeds = module.TARGETS, module.load_seeds()
     # libFuzzer ends the process without returning to Python, so counts are written to the file immediately
     counts = np.memmap(file, np.int64, "w+", shape=(len(targets), 2))

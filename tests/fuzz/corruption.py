@@ -21,8 +21,8 @@ def corrupt(data: bytes, edits: list[tuple[int, int]], kept_share: float, tail: 
     return bytes(octets[: round(kept_share * len(octets))]) + tail
 
 
-def hostile_inputs(seeds: Sequence[bytes]) -> st.SearchStrategy[bytes]:
-    """Return a strategy of random bytes and corrupted `seeds`."""
-    shown = st.sampled_from([data for data in seeds if len(data) <= MAX_SHOWN_BYTES])
+def hostile_inputs(seeds: Sequence[bytes], max_bytes: int = MAX_SHOWN_BYTES) -> st.SearchStrategy[bytes]:
+    """Return a strategy of random bytes and corrupted `seeds` of at most `max_bytes`."""
+    shown = st.sampled_from([data for data in seeds if len(data) <= max_bytes])
     kept = st.just(1.0) | st.floats(0, 1)
     return st.binary(max_size=600) | st.builds(corrupt, shown, EDITS, kept, st.binary(max_size=40))

@@ -6,16 +6,11 @@ BUNRAKU_FUZZ_RUNS sets the number of coverage-guided inputs of each target.
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from functools import reduce
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -23,14 +18,9 @@ from hypothesis import strategies as st
 from tests.fuzz.capture_targets import DICTIONARY, TARGETS, load_seeds
 from tests.fuzz.corruption import hostile_inputs
 from tests.fuzz.datagram_sequence import LENGTH, join_datagrams
+from tests.fuzz.guided import TIMEOUT_S, run_guided
 
-REPOSITORY = Path(__file__).resolve().parents[2]
 EXAMPLES = 500
-RUNS = int(os.environ.get("BUNRAKU_FUZZ_RUNS", "10000"))
-MAX_INPUT_BYTES = 16_384
-MIN_INPUTS_PER_S = 50
-"""Rate below which a run counts as hanging."""
-
 NAMES = [target.__name__ for target in TARGETS]
 SEEDS = load_seeds()
 
@@ -115,36 +105,10 @@ def test_seeds_are_accepted(seed: tuple[int, bytes]) -> None:
     assert TARGETS[seed[0]](seed[1])
 
 
-@pytest.mark.timeout(120 + RUNS // MIN_INPUTS_PER_S)
+@pytest.mark.timeout(TIMEOUT_S)
 @pytest.mark.parametrize("number", range(len(TARGETS)), ids=NAMES)
 def test_coverage_guided_input_is_accepted_or_rejected_as_declared(
     number: int, tmp_path: Path, tally: Callable[[str], None]
 ) -> None:
-    if find_spec("atheris") is None:
-        reason = "atheris is not installed: it has wheels for CPython 3.11 to 3.14 on Linux, x86-64"
-        pytest.fail(reason) if os.environ.get("CI") else pytest.skip(reason)
-    corpus, file = tmp_path / "corpus", tmp_path / "counts"
-    corpus.mkdir()
-    words = tmp_path / "words"
-    words.write_text("".join(f"{json.dumps(word)}\n" for word in DICTIONARY), encoding="ascii")
-    options = [
-        f"-dict={words}",
-        f"-runs={RUNS}",
-        f"-max_len={MAX_INPUT_BYTES}",
-        "-timeout=60",
-        "-rss_limit_mb=1024",
-        f"-artifact_prefix={tmp_path}/",
-    ]
-    result = subprocess.run(
-        [sys.executable, "-m", "tests.fuzz", NAMES[number], corpus, file, *options],
-        cwd=REPOSITORY,
-        capture_output=True,
-        text=True,
-        timeout=100 + RUNS // MIN_INPUTS_PER_S,
-        check=False,
-    )
-    assert result.returncode == 0, result.stdout[-4000:] + result.stderr[-2000:]
-    rejected, accepted = np.fromfile(file, np.int64).reshape(len(TARGETS), 2)[number].tolist()
-    assert rejected + accepted >= RUNS
-    assert min(rejected, accepted) > 0
+    rejected, accepted = run_guided(NAMES[number], number, len(TARGETS), DICTIONARY, tmp_path)
     tally(f"atheris, {NAMES[number]}: {rejected + accepted} inputs, {accepted} accepted, {rejected} rejected")

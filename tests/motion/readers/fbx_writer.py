@@ -9,6 +9,7 @@ import numpy as np
 from bunraku.motion import rotation
 from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.rotation import Array
+from bunraku.motion.source_motion import SourceMotion
 from tests.motion.readers.sources import local_transforms
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
 
@@ -18,14 +19,15 @@ ORDERS = ("XYZ", "XZY", "YZX", "YXZ", "ZXY", "ZYX")
 
 
 def write_fbx(
+    source: SourceMotion | None = None,
     *,
     takes: Sequence[str] = ("dance",),
     pre_rotation: tuple[float, float, float] = (0.0, 0.0, 0.0),
     order: str = "XYZ",
     units_per_metre: float = 100.0,
 ) -> bytes:
-    """Return a dance of 20 frames; later takes move fewer joints."""
-    source = parse_bvh(export_bvh(smooth_motion(frames=20), units_per_metre=units_per_metre))
+    """Return `source`, by default a dance of 20 frames; later takes move fewer joints."""
+    source = source or parse_bvh(export_bvh(smooth_motion(frames=20), units_per_metre=units_per_metre))
     offsets, turns = local_transforms(source)
     before = _from_degrees(np.array(pre_rotation), "XYZ")
     degrees = _to_degrees(rotation.multiply(rotation.conjugate(before), turns), order)

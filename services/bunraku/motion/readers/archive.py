@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import posixpath
+import struct
 import zipfile
 import zlib
 
@@ -15,6 +16,8 @@ MAX_UNPACKED_BYTES = 64 << 20
 """Size of one unpacked file."""
 MOTION_SUFFIXES = (".bvh", ".fbx", ".glb", ".gltf", ".vrma", ".vrm", ".amc", ".c3d")
 SKELETON_SUFFIX = ".asf"
+_ARCHIVE_ERRORS = (zipfile.BadZipFile, ValueError, NotImplementedError, RuntimeError, OSError, struct.error)
+"""Errors of `zipfile` for broken archives."""
 
 
 class Archive:
@@ -24,11 +27,11 @@ class Archive:
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             members = self._zip.infolist()
-        except (zipfile.BadZipFile, ValueError, NotImplementedError, OSError) as error:
+        except _ARCHIVE_ERRORS as error:
             raise UnreadableMotion("Broken archive", "the zip file cannot be opened", hint="pack it again") from error
         if len(members) > MAX_MEMBERS:
             raise UnreadableMotion("Too many files", f"over {MAX_MEMBERS:,} of them", hint="pack fewer files")
-        self._members = {member.filename: member for member in members if not member.is_dir()}
+        self._members = {member.filename: member for member in members if not member.filename.endswith("/")}
 
     def names(self, *suffixes: str) -> list[str]:
         """Return the paths of visible files with one of the suffixes, in alphabetical order."""
@@ -51,7 +54,7 @@ class Archive:
         try:
             with self._zip.open(member) as file:
                 data = file.read(MAX_UNPACKED_BYTES + 1)
-        except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+        except (*_ARCHIVE_ERRORS, zlib.error, EOFError) as error:
             detail = "a file cannot be unpacked"
             raise UnreadableMotion("Broken archive", detail, field=name, hint="pack it again") from error
         if len(data) > MAX_UNPACKED_BYTES:

@@ -1,0 +1,26 @@
+"""Broken FBX files in a process of their own: `python -m tests.fuzz.fbx SEED COUNT` prints how many were rejected and
+accepted. A failure ends the process."""
+
+from __future__ import annotations
+
+import random
+import sys
+
+from tests.fuzz.corruption import corrupt
+from tests.fuzz.reader_targets import fbx, load_fbx_seed
+
+MAX_EDITS = 8
+
+
+def main() -> None:
+    seed, count = map(int, sys.argv[1:])
+    chance, whole, counts = random.Random(seed), load_fbx_seed(), [0, 0]
+    for _ in range(count):
+        edits = [(chance.randrange(len(whole)), chance.randrange(256)) for _ in range(chance.randrange(MAX_EDITS))]
+        kept = chance.choice((1.0, 1.0, chance.random()))
+        counts[fbx(corrupt(whole, edits, kept, chance.randbytes(chance.randrange(8))))] += 1
+    print(*counts)
+
+
+if __name__ == "__main__":
+    main()
