@@ -127,13 +127,6 @@ PROFILES: tuple[NamingProfile, ...] = (
         "head|upperneck",
         "hip knee ankle|foot foot|toe|toes|toebase shoulder elbow wrist|hand",
     ),
-    _limb_profile(
-        "SMPL (letters)",
-        LETTERS,
-        "pelvis|root",
-        "head|upperneck",
-        "hip knee ankle|foot foot|toe|toes|toebase shoulder elbow wrist|hand",
-    ),
     _limb_profile("mocopi", LETTERS, "root", "head", "upleg lowleg foot toes uparm lowarm hand"),
     _limb_profile("Acclaim", LETTERS, "root", "head", "femur tibia foot toes humerus radius wrist|hand"),
     _limb_profile("Biovision (classic)", WORDS, "hips", "head", "upleg lowleg foot toe uparm lowarm hand"),

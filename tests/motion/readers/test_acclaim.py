@@ -96,12 +96,19 @@ def test_missing_bones_are_refused() -> None:
         (b"1\nroot 0 0 0\n", "degrees of freedom"),
         (b"1\nroot 0 0 0 0 0 nan\n", "not numbers"),
         (b"1\nnobody 1\n", "no bone 'nobody'"),
+        (b"1\nl_hip 1 2 3\nl_hip 1 2 3\n", "twice in a frame"),
     ],
 )
 def test_broken_motions_are_refused_with_the_line(data: bytes, detail: str) -> None:
     with pytest.raises(UnreadableMotion, match=detail) as caught:
         parse_amc(data, parse_asf(ASF))
     assert caught.value.line is not None
+
+
+def test_bones_without_values_in_a_frame_are_at_rest_in_it() -> None:
+    motion = parse_amc(b"1\nl_hip 10 0 0\n2\n3\nl_hip 20 0 0\n4\n", parse_asf(ASF))
+    turned = np.degrees(2.0 * np.arccos(motion.orientations[:, motion.names.index("l_hip"), 0]))
+    np.testing.assert_allclose(turned, [10.0, 0.0, 20.0, 0.0], atol=1e-6)
 
 
 def test_motion_without_frames_is_refused() -> None:

@@ -7,6 +7,7 @@ Source: Acclaim's ASF/AMC specification (J. Lander, "Working with Motion Capture
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
@@ -20,7 +21,7 @@ from bunraku.motion.source_motion import EndSite, SampledMotion, chain_transform
 AMC_FPS = 120.0
 """Frame rate of the CMU database, where nearly all files are from."""
 MAX_BONES = 1_000
-MAX_JOINT_FRAMES = 8_000_000
+MAX_JOINT_FRAMES = 4_000_000
 """Bound of bones times frames."""
 ROOT = "root"
 _DOF = {"tx": (0, False), "ty": (1, False), "tz": (2, False), "rx": (0, True), "ry": (1, True), "rz": (2, True)}
@@ -72,48 +73,52 @@ def parse_amc(data: bytes, skeleton: AcclaimSkeleton) -> SampledMotion:
     """Parse the frames of an AMC file for `skeleton`. Raises `UnreadableMotion`."""
     bones = skeleton.bones
     index = {bone.name: number for number, bone in enumerate(bones)}
-    values: list[list[Sequence[float]]] = []
-    radians = skeleton.radians
+    tracks = [array("d") for _ in bones]
+    count, radians = 0, skeleton.radians
     for line, words in _lines(data):
         if words[0].startswith(":"):
-            radians = (
-                1.0
-                if words[0].lower() == ":radians"
-                else math.pi / 180.0
-                if words[0].lower() == ":degrees"
-                else radians
-            )
+            radians = {":radians": 1.0, ":degrees": math.pi / 180.0}.get(words[0].lower(), radians)
         elif len(words) == 1 and words[0].isdigit():
-            values.append([()] * len(bones))
-            if len(values) * len(bones) > MAX_JOINT_FRAMES:
+            count += 1
+            if count * len(bones) > MAX_JOINT_FRAMES:
                 raise UnreadableMotion(
-                    "Too much motion", f"over {MAX_JOINT_FRAMES:,} angles", line=line, hint="cut it into shorter clips"
+                    "Too much motion",
+                    f"over {MAX_JOINT_FRAMES:,} positions of bones",
+                    line=line,
+                    hint="cut it into shorter clips",
                 )
-        elif not values:
+        elif count == 0:
             raise _broken("values before the number of a frame", line)
         else:
-            bone = index.get(words[0])
-            if bone is None:
+            number = index.get(words[0])
+            if number is None:
                 raise _broken(
                     f"the skeleton has no bone {quote_excerpt(words[0])}", line, "is this the ASF of this AMC?"
                 )
-            if len(words) - 1 != len(bones[bone].dof):
-                raise _broken(
-                    f"{words[0]} has {len(words) - 1} values, but {len(bones[bone].dof)} degrees of freedom", line
-                )
-            values[-1][bone] = _numbers(words[1:], line)
-    if not values:
+            freedom = len(bones[number].dof)
+            if len(words) - 1 != freedom:
+                raise _broken(f"{words[0]} has {len(words) - 1} values, but {freedom} degrees of freedom", line)
+            if len(tracks[number]) > (count - 1) * freedom:
+                raise _broken(f"{words[0]} is there twice in a frame", line)
+            # frames without the bone have it at rest
+            tracks[number].extend([0.0] * ((count - 1) * freedom - len(tracks[number])))
+            tracks[number].extend(_numbers(words[1:], line))
+    if count == 0:
         raise UnreadableMotion("No motion", "the file has no frames", hint=_REMEDY)
-    return _pose_bones(skeleton, values, radians)
+    angles = []
+    for bone, track in zip(bones, tracks, strict=True):
+        freedom = len(bone.dof)
+        track.extend([0.0] * (count * freedom - len(track)))
+        angles.append(np.array(track).reshape(count, freedom))
+    return _pose_bones(skeleton, angles, count, radians)
 
 
-def _pose_bones(skeleton: AcclaimSkeleton, values: list[list[Sequence[float]]], radians: float) -> SampledMotion:
-    """Return the bones' transforms; a bone without values in a frame stays at rest in it."""
-    bones, count = skeleton.bones, len(values)
+def _pose_bones(skeleton: AcclaimSkeleton, tracks: Sequence[Array], count: int, radians: float) -> SampledMotion:
+    """Return the bones' transforms from the values (`count`, degrees of freedom) of each."""
+    bones = skeleton.bones
     offsets = np.zeros((count, len(bones), 3))
     turns = np.tile(rotation.IDENTITY, (count, len(bones), 1))
-    for number, bone in enumerate(bones):
-        track = np.array([frame[number] or (0.0,) * len(bone.dof) for frame in values]).reshape(count, -1)
+    for number, (bone, track) in enumerate(zip(bones, tracks, strict=True)):
         offset = bones[skeleton.parents[number]].vector if number else skeleton.root_offset
         offsets[:, number] = offset
         turn = np.tile(rotation.IDENTITY, (count, 1))

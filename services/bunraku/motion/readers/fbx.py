@@ -26,6 +26,7 @@ _LOAD_OPTIONS: dict[str, Any] = {
     "ignore_embedded": True,
     "node_depth_limit": 256,
 }
+_Keep = Callable[[Any], Any]
 _BONELESS = {ufbx.ElementType.MESH, ufbx.ElementType.CAMERA, ufbx.ElementType.LIGHT}
 
 
@@ -41,31 +42,31 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
         except (ufbx.UfbxError, ValueError) as error:
             detail = str(error) or type(error).__name__
             raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
-        stacks = list(scene.anim_stacks)
+        stacks = [keep(stack) for stack in keep(scene.anim_stacks)]
         if not stacks:
             raise UnreadableMotion(
                 "No animation", "the file has a model, but no animation", hint="export it with its animation"
             )
-        key_times = [_read_key_times(stack) for stack in stacks]
+        curves = [_moving_curves(stack, keep) for stack in stacks]
         names = [stack.name or f"take {number}" for number, stack in enumerate(stacks, 1)]
-        chosen = choose_take(names, [len(times) for times in key_times], take)
-        times = key_times[chosen]
+        chosen = choose_take(names, [len(moving) for moving in curves], take)
+        times = [np.array([key.time for key in keep(curve.keyframes)]) for curve in curves[chosen]]
         if not times:
             detail = f"the take {quote_excerpt(names[chosen])} moves nothing"
             raise UnreadableMotion("Nothing moves", detail, field=names[chosen])
         start, end = _find_span(stacks[chosen], times)
-        nodes, elements = _read_nodes(scene)
+        nodes, elements = _read_nodes(scene, keep)
         motion = sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
         _sample_tracks(keep(stacks[chosen].anim), motion, elements)
         return motion
 
 
 @contextmanager
-def _uncollected() -> Iterator[Callable[[Any], Any]]:
-    """Give a function that keeps an object of ufbx for ever, and exempt all objects from garbage collection.
+def _uncollected() -> Iterator[_Keep]:
+    """Give a function that returns an object of ufbx and keeps it for ever; exempt all objects from garbage collection.
 
-    In ufbx 0.0.5, objects do not count their references to the scene: the garbage collector and the end of an
-    animation object free memory that is in use.
+    In ufbx 0.0.5, objects do not count their references to the scene: the garbage collector and the end of an object
+    free memory that is in use.
     """
 
     def keep(item: Any) -> Any:
@@ -82,14 +83,14 @@ def _uncollected() -> Iterator[Callable[[Any], Any]]:
             gc.enable()
 
 
-def _read_key_times(stack: ufbx.AnimStack) -> list[Array]:
-    """Return the times of the keys of each curve of a take."""
-    curves = [curve for layer in stack.layers for prop in layer.anim_props for curve in prop.anim_value.curves]
-    return [
-        np.array([key.time for key in curve.keyframes])
-        for curve in curves
-        if curve is not None and len(curve.keyframes) > 0
-    ]
+def _moving_curves(stack: ufbx.AnimStack, keep: _Keep) -> list[ufbx.AnimCurve]:
+    """Return the curves of a take that have keys."""
+    found = []
+    for layer in keep(stack.layers):
+        for prop in keep(keep(layer).anim_props):
+            curves = keep(keep(keep(prop).anim_value).curves)
+            found += [keep(curve) for curve in curves if curve is not None and len(keep(curve.keyframes)) > 0]
+    return found
 
 
 def _find_span(stack: ufbx.AnimStack, key_times: Sequence[Array]) -> tuple[float, float]:
@@ -100,10 +101,10 @@ def _find_span(stack: ufbx.AnimStack, key_times: Sequence[Array]) -> tuple[float
     return float(chosen[0]), float(chosen[-1])
 
 
-def _read_nodes(scene: ufbx.Scene) -> tuple[list[Node], list[ufbx.Node]]:
+def _read_nodes(scene: ufbx.Scene, keep: _Keep) -> tuple[list[Node], list[ufbx.Node]]:
     """Return the nodes that may be joints, with their ancestors, parents first, and what they are in the file."""
-    everything = list(scene.nodes)
-    parents = [-1 if node.parent is None else node.parent.typed_id for node in everything]
+    everything = [keep(node) for node in keep(scene.nodes)]
+    parents = [-1 if node.parent is None else keep(node.parent).typed_id for node in everything]
     kept: set[int] = set()
     for number, node in enumerate(everything):
         above = -1 if node.attrib_type in _BONELESS else number

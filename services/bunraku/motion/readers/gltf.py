@@ -42,12 +42,13 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
             "No animation", "the file has a model, but no animation", hint="export it with its animation"
         )
     names = [str(animation.get("name") or f"animation {number}") for number, animation in enumerate(animations, 1)]
-    tracks = [_read_tracks(file, animation, number) for number, animation in enumerate(animations)]
-    chosen = choose_take(names, [len(moved) for moved in tracks], take)
-    nodes, kept = _read_nodes(file, tracks[chosen])
-    for node, of in tracks[chosen].items():
-        nodes[kept[node]].tracks.update(of)
-    times = [track.times for of in tracks[chosen].values() for track in of.values()]
+    channels = [_find_channels(file, animation, f"animations[{number}]") for number, animation in enumerate(animations)]
+    chosen = choose_take(names, [len({node for node, _ in moved}) for moved in channels], take)
+    tracks = _read_tracks(file, animations[chosen], channels[chosen], f"animations[{chosen}]")
+    nodes, kept = _read_nodes(file, {node for node, _ in tracks})
+    for (node, path), track in tracks.items():
+        nodes[kept[node]].tracks[path] = track
+    times = [track.times for track in tracks.values()]
     if not times:
         raise UnreadableMotion(
             "Nothing moves", f"the animation {quote_excerpt(names[chosen])} moves no node", field=names[chosen]
@@ -56,22 +57,33 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
     return sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
 
 
-def _read_tracks(file: GltfFile, animation: dict[str, Any], number: int) -> dict[int, dict[str, Track]]:
-    """Return the tracks of an animation by node and property. Channels of other properties are skipped."""
-    where = f"animations[{number}]"
-    samplers = check_objects(animation.get("samplers", []), f"{where}.samplers")
-    inputs: dict[object, Array] = {}
-    found: dict[int, dict[str, Track]] = {}
+_Channels = dict[tuple[int, str], object]
+"""Index of the sampler by node and property."""
+
+
+def _find_channels(file: GltfFile, animation: dict[str, Any], where: str) -> _Channels:
+    """Return the channels of an animation. Those of other properties are skipped."""
+    found: _Channels = {}
     for channel in check_objects(animation.get("channels", []), f"{where}.channels"):
         target = channel.get("target")
-        if not isinstance(target, dict) or target.get("path") not in COMPONENTS or "node" not in target:
-            continue
-        node, path = file.check_index("nodes", target["node"]), target["path"]
-        sampler = samplers[check_index(channel.get("sampler"), samplers, f"{where}.samplers")]
-        source = sampler.get("input")
+        if isinstance(target, dict) and target.get("path") in COMPONENTS and "node" in target:
+            found[file.check_index("nodes", target["node"]), target["path"]] = channel.get("sampler")
+    return found
+
+
+def _read_tracks(
+    file: GltfFile, animation: dict[str, Any], channels: _Channels, where: str
+) -> dict[tuple[int, str], Track]:
+    """Return the tracks of an animation by node and property."""
+    samplers = check_objects(animation.get("samplers", []), f"{where}.samplers")
+    inputs: dict[int, Array] = {}
+    found: dict[tuple[int, str], Track] = {}
+    for (node, path), index in channels.items():
+        sampler = samplers[check_index(index, samplers, f"{where}.samplers")]
+        source = file.check_index("accessors", sampler.get("input"))
         if source not in inputs:
             inputs[source] = _read_times(file, source, where)
-        found.setdefault(node, {})[path] = _read_track(file, sampler, inputs[source], path, where)
+        found[node, path] = _read_track(file, sampler, inputs[source], path, where)
     return found
 
 
@@ -100,14 +112,14 @@ def _read_track(file: GltfFile, sampler: dict[str, Any], times: Array, path: str
     return Track(times, values.reshape(len(times), 3, -1) if per_key == 3 else values, interpolation)
 
 
-def _read_nodes(file: GltfFile, tracks: dict[int, dict[str, Track]]) -> tuple[list[Node], dict[int, int]]:
-    """Return the nodes that move, carry a skin or are bones of a humanoid, with their ancestors, below one root.
+def _read_nodes(file: GltfFile, moved: set[int]) -> tuple[list[Node], dict[int, int]]:
+    """Return the nodes that are `moved`, carry a skin or are bones of a humanoid, with their ancestors, below one root.
 
     Also returns the position in this list of each node of the file.
     """
     parents = _find_parents(file)
     bones = _humanoid_bones(file)
-    wanted = {*tracks, *bones}
+    wanted = {*moved, *bones}
     for number, skin in enumerate(file.items("skins")):
         joints = skin.get("joints", [])
         if not isinstance(joints, list):

@@ -17,8 +17,8 @@ from bunraku.motion.rotation import Array
 GLB_MAGIC = b"glTF"
 MAX_JSON_ITEMS = 1_000_000
 """Members and elements of the JSON part; a motion of an hour has a few thousand."""
-MAX_VALUES = 50_000_000
-"""Numbers of one accessor."""
+MAX_VALUES = 32_000_000
+"""Numbers of all accessors that are read together: twice those of a file of 64 MiB, as accessors may share data."""
 
 _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
@@ -36,6 +36,7 @@ class GltfFile:
     binary: bytes
     _items: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     _buffers: dict[int, bytes] = field(default_factory=dict)
+    _values_read: int = 0
 
     def items(self, name: str) -> list[dict[str, Any]]:
         """Return the objects of an array at the top, empty if there is none."""
@@ -60,6 +61,11 @@ class GltfFile:
             raise broken(where, f"it has no elements of {components} numbers")
         if isinstance(count, bool) or not isinstance(count, int) or not 0 < count <= MAX_VALUES // components:
             raise broken(where, f"count is {quote_excerpt(str(count))}")
+        self._values_read += count * components
+        if self._values_read > MAX_VALUES:
+            raise UnreadableMotion(
+                "Too much motion", f"over {MAX_VALUES:,} numbers", field=where, hint="cut it into shorter animations"
+            )
         if "sparse" in accessor or "bufferView" not in accessor:
             raise broken(where, "sparse accessors are not read")
         values = self._read_view(accessor, np.dtype(dtype), count, components)

@@ -4,7 +4,7 @@
 const GLB_HEADER_BYTES = 20;
 const LENGTH_OFFSET = 12;
 /** Largest JSON part that is read. Larger ones are those of avatars with long tables. */
-const MAX_JSON_BYTES = 16 << 20;
+const MAX_JSON_BYTES = 4 << 20;
 
 export type FileKind = "avatar" | "motion";
 
