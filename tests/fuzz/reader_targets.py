@@ -1,7 +1,7 @@
 """Fuzzing targets: the readers of motion files, and invariants of every motion that they return.
 
 A target returns True if it accepts a file and False if it rejects it with `UnreadableMotion`. Any other exception is a
-failure. The reader of FBX is a compiled library that can end the process: its target is for a process of its own.
+failure. The reader of FBX is a compiled library that can end the process: its target is for a separate process.
 """
 
 from __future__ import annotations

@@ -77,10 +77,10 @@ class NameIndex:
 
 
 class SidePlace(Enum):
-    """Where the names of a skeleton have the side."""
+    """Place of the side in the names of a skeleton."""
 
     APART = auto()
-    """At the beginning or end, or a word of its own in the middle."""
+    """At the beginning or end, or a separate word in the middle."""
     BEFORE = auto()
     """Directly before a profile's pattern."""
     AFTER = auto()
@@ -89,7 +89,7 @@ class SidePlace(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Spelling:
-    """How the names of a skeleton say sides: by which words, in which place, and what all names begin and end with."""
+    """Spelling of a skeleton's names: words for the sides and their place, prefix and suffix of all names."""
 
     words: tuple[str, str]
     place: SidePlace

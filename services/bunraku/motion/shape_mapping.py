@@ -21,7 +21,7 @@ from bunraku.motion.source_motion import SourceMotion, bone_lengths
 MAX_LENGTH_DIFFERENCE = 0.15
 """Largest difference of left and right bones, as a share of the longer."""
 MIN_LIMB_RATIO = 0.2
-"""Smallest limb, as a share of the longest one: how far the root is away does not matter."""
+"""Smallest limb, as a share of the longest one; the distance of the root does not matter."""
 MAX_SHORT_RATIO = 0.01
 """Bones shorter than this share of the median have no length: two joints at one place."""
 MAX_FOREARM_RATIO = 0.8

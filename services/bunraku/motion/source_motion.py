@@ -24,7 +24,7 @@ class EndSite:
 class SourceMotion(Protocol):
     """Motion of J joints in the source's units, axes and names; parents come before their children.
 
-    Its rest pose has no meaning of its own; it is where the source's rotations begin.
+    Its rest pose may be any; the source's rotations begin there.
     """
 
     @property

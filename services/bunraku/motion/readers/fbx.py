@@ -34,7 +34,7 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
     """Parse the take (animation stack) `take` of an FBX file, by default the one that moves most.
 
     Raises `UnreadableMotion` if the data is not an FBX file or has no such take. A file that crashes ufbx ends the
-    process: parse in a process of its own.
+    process: parse in a separate process.
     """
     with _uncollected() as keep:
         try:

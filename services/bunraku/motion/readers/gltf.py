@@ -145,7 +145,7 @@ def _read_nodes(file: GltfFile, moved: set[int]) -> tuple[list[Node], dict[int, 
 
 
 def _find_parents(file: GltfFile) -> list[int]:
-    """Return the parent of each node, -1 for roots; raise `UnreadableMotion` for what is no tree."""
+    """Return the parent of each node, -1 for roots; raise `UnreadableMotion` unless they are a tree."""
     items = file.items("nodes")
     parents = [-1] * len(items)
     for index, item in enumerate(items):

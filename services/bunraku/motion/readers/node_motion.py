@@ -20,7 +20,7 @@ MAX_FRAMES, MAX_JOINT_FRAMES = 1_000_000, 8_000_000
 MIN_FPS, MAX_FPS, DEFAULT_FPS = 24.0, 240.0, 60.0
 """Keys that are less dense than `MIN_FPS` are sampled at `DEFAULT_FPS`."""
 MIN_SCALE = 1e-9
-"""Smaller scales count as this one, so that what is below keeps its orientation."""
+"""Smaller scales count as this one, so that descendants keep their orientation."""
 EVEN_TOLERANCE = 0.02
 """Frame rates this near to a whole number, as a share, are that number."""
 
@@ -102,7 +102,7 @@ class Node:
 class NodeMotion:
     """Source motion of nodes, parents before their children, sampled at `fps` from `start`, in seconds.
 
-    Scales act on the positions of what is below; a node's orientation is that of its axes, without scale.
+    Scales act on the positions of descendants; a node's orientation is that of its axes, without scale.
     """
 
     nodes: tuple[Node, ...]

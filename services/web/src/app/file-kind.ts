@@ -1,4 +1,4 @@
-/** What a dropped file is: an avatar, or a motion for the library. */
+/** Kind of a dropped file: an avatar, or a motion for the library. */
 
 /** Bytes before the JSON part of a GLB file, which begins with the length of that part. */
 const GLB_HEADER_BYTES = 20;
@@ -23,7 +23,7 @@ async function hasAnimations(file: File, isBinary: boolean): Promise<boolean> {
     const { animations } = JSON.parse(await part.text()) as { animations?: unknown };
     return Array.isArray(animations) && animations.length > 0;
   } catch {
-    // Whatever this is, the reader of avatars says what is wrong with it.
+    // The reader of avatars reports the problem.
     return false;
   }
 }

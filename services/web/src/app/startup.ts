@@ -14,7 +14,7 @@ const FIRST_FRAME_TIMEOUT_MS = 2_000;
 export class StartupSequence {
   /** Resolves when the page around the stage shall be loaded. */
   readonly loadDue: Promise<void>;
-  /** Resolves when the page around the stage shall be built: the first frame was drawn, is late, or there will be none. */
+  /** Resolves when the page around the stage shall be built: after the first frame, or if it is late or impossible. */
   readonly buildDue: Promise<void>;
   #setLoadDue: () => void = () => undefined;
   #setBuildDue: () => void = () => undefined;

@@ -211,7 +211,7 @@ export class Engine {
     }
   }
 
-  /** Load the code of the puppet's mesh, which is smaller than the renderer. Without it the stage will not load either. */
+  /** Load the code of the puppet's mesh, which is smaller than the renderer's. If that fails, the stage fails too. */
   async #loadMesh(detail: Detail): Promise<void> {
     const mesh = await import("../stage/puppet/puppet-geometry").catch(() => null);
     this.#prepareMesh = (figure) => mesh?.preparePuppetGeometry(figure, detail);
