@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from bunraku.codec import prior
 from bunraku.codec.block_encoder import MEAN_ERROR_REFINEMENT, BlockEncoder
+from bunraku.codec.channel_layout import MOTION_LAYOUT
 from bunraku.codec.coefficients import decode_coefficients, duration_level
 from bunraku.codec.motion_track import plan_motion_track
 from bunraku.codec.prior import Prior
@@ -50,7 +51,9 @@ def collect_examples(folder: Path, clip: str, current: Prior, round_number: int)
             header, q = decode_coefficients(current, data, track.block_frames, track.fps)
             numbers = np.array([header.frames, header.step, header.heading, q.shape[2], CHANNEL_COUNT], dtype=np.int64)
             level = duration_level(header.frames, track.fps)
-            block_features, block_labels = load_kernels("codec").collect_examples(current, q, numbers, level)
+            block_features, block_labels = load_kernels("codec").collect_examples(
+                current, MOTION_LAYOUT, q, numbers, level
+            )
             features.append(block_features.astype(np.int16))
             labels.append(block_labels.astype(np.int32))
     return np.concatenate(features), np.concatenate(labels)

@@ -6,9 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec import coefficients, prior
+from bunraku.codec.channel_layout import SCENE_LAYOUT
 from bunraku.codec.coefficients import MAX_BLOCK_BYTES, BlockHeader
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import SCENE_CHANNEL_COUNT, IntArray
+from bunraku.codec.prior import IntArray
+from bunraku.codec.scene import SCENE_CHANNEL_COUNT
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
 PRIOR = prior.load_shipped_prior()
@@ -45,8 +47,8 @@ def test_scene_block_round_trips(seed: int, count: int, magnitude: float, frames
     q = random_coefficients(seed, count, magnitude)[:SCENE_CHANNEL_COUNT]
     q[2, 1:] = 0
     header = BlockHeader(frames, step, 0)
-    data = coefficients.encode_coefficients(PRIOR, header, q, 60, FPS)
-    decoded_header, decoded = coefficients.decode_coefficients(PRIOR, data, 60, FPS, SCENE_CHANNEL_COUNT)
+    data = coefficients.encode_coefficients(PRIOR, header, q, 60, FPS, SCENE_LAYOUT)
+    decoded_header, decoded = coefficients.decode_coefficients(PRIOR, data, 60, FPS, SCENE_LAYOUT)
     assert decoded_header == header
     used = decoded.shape[2]
     np.testing.assert_array_equal(decoded, q[:, :, :used])
@@ -68,7 +70,14 @@ def test_block_of_zeros_costs_few_bytes() -> None:
     q = np.zeros((CHANNEL_COUNT, 3, 30), dtype=np.int64)
     assert len(coefficients.encode_coefficients(PRIOR, BlockHeader(30, 200, -32), q, 30, FPS)) <= 6
     assert len(coefficients.encode_coefficients(PRIOR, BlockHeader(499, 200, -32), q, 30, FPS)) <= 9
-    assert len(coefficients.encode_coefficients(PRIOR, BlockHeader(30, 200, 0), q[:SCENE_CHANNEL_COUNT], 30, FPS)) <= 3
+    assert (
+        len(
+            coefficients.encode_coefficients(
+                PRIOR, BlockHeader(30, 200, 0), q[:SCENE_CHANNEL_COUNT], 30, FPS, SCENE_LAYOUT
+            )
+        )
+        <= 3
+    )
 
 
 @given(st.binary(max_size=300), st.integers(1, 120))

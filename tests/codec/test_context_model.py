@@ -5,13 +5,14 @@ import numpy as np
 from bunraku.codec import prior
 from bunraku.codec._kernels import context_model
 from bunraku.codec._kernels.context_model import MAX_SCALE, MIN_SCALE
+from bunraku.codec.channel_layout import MOTION_LAYOUT
 
 PRIOR = prior.load_shipped_prior()
 
 
 def predicted_scales(magnitude: int) -> list[int]:
     """Return the scales of the third channel's frequencies after coefficients of one magnitude."""
-    context = context_model.create_context_model(PRIOR, 12, 120, 64)
+    context = context_model.create_context_model(PRIOR, MOTION_LAYOUT, 12, 120, 64)
     scales = []
     for channel in range(3):
         for k in range(12):
@@ -43,7 +44,7 @@ def test_hidden_layer_contributes_to_the_scale() -> None:
         out=np.full_like(PRIOR.out, 4096),
         hidden=0 * PRIOR.hidden,
     )
-    context = context_model.create_context_model(saturated, 3, 120, 64)
+    context = context_model.create_context_model(saturated, MOTION_LAYOUT, 3, 120, 64)
     context_model.compute_shared_sums(context, 0, 0)
     assert context_model.predict_scale(context, 0, 0, 0) == MAX_SCALE
 

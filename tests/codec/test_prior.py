@@ -6,23 +6,11 @@ import numpy as np
 import pytest
 
 from bunraku.codec import prior
-from bunraku.codec.prior import FREQUENCY_CLASS_OF, MAGNITUDE_LEVELS, RELATIVE_CHANNELS, SHAPES, Prior
-from bunraku.motion.skeleton import JOINTS
+from bunraku.codec.prior import FREQUENCY_CLASS_OF, MAGNITUDE_LEVELS, SHAPES, Prior
 
 
 def test_magnitude_levels_are_16_log2() -> None:
     np.testing.assert_array_equal(MAGNITUDE_LEVELS, np.round(16 * np.log2(1 + np.arange(4096))))
-
-
-def test_relative_channels_are_earlier_and_mirrors_are_on_the_left() -> None:
-    channels = np.arange(19)
-    assert (channels > RELATIVE_CHANNELS).all()
-    channel = {name: index + 1 for index, name in enumerate(JOINTS)}
-    parent, mirror, grandparent = RELATIVE_CHANNELS
-    assert parent[channel["l_knee"]] == channel["l_hip"]
-    assert mirror[channel["r_elbow"]] == channel["l_elbow"]
-    assert mirror[channel["vl5"]] == channel["r_midtarsal"]
-    assert grandparent[channel["l_wrist"]] == channel["l_shoulder"]
 
 
 def test_frequency_classes() -> None:

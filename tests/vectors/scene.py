@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from bunraku.codec import coefficients
+from bunraku.codec.channel_layout import SCENE_LAYOUT
 from bunraku.codec.coefficients import BlockHeader
-from bunraku.codec.prior import SCENE_CHANNEL_COUNT, IntArray, load_shipped_prior
-from bunraku.codec.scene import SceneSamples, SceneTrack
+from bunraku.codec.prior import IntArray, load_shipped_prior
+from bunraku.codec.scene import SCENE_CHANNEL_COUNT, SceneSamples, SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import encode_scene
 from tests.vectors.blocks import encode_header, to_base64
@@ -37,7 +38,7 @@ def sample_light(seconds: float, fps: float) -> SceneSamples:
 def block_vector(track: SceneTrack, number: int, data: bytes) -> dict[str, Any]:
     """Return a valid block of track `number` with its decoded header, coefficients and values."""
     header, q = coefficients.decode_coefficients(
-        load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
+        load_shipped_prior(), data, track.block_frames, track.fps, SCENE_LAYOUT
     )
     instants = (0.0, header.frames / 3 - 0.5, header.frames - 1.0, header.frames - 0.5)
     values = decode_scene_block(track, data).values_at(np.array(instants))
@@ -87,7 +88,7 @@ def make_vectors() -> dict[str, Any]:
         track = tracks[number]
         q = _random_coefficients(random, count, max_magnitude)
         data = coefficients.encode_coefficients(
-            load_shipped_prior(), BlockHeader(frames, step, 0), q, track.block_frames, track.fps
+            load_shipped_prior(), BlockHeader(frames, step, 0), q, track.block_frames, track.fps, SCENE_LAYOUT
         )
         valid.append(block_vector(track, number, data))
     nominal = tracks[0].block_frames

@@ -8,8 +8,9 @@ import json
 import pytest
 
 from bunraku.codec import coefficients
+from bunraku.codec.channel_layout import SCENE_LAYOUT
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import SCENE_CHANNEL_COUNT, load_shipped_prior
+from bunraku.codec.prior import load_shipped_prior
 from bunraku.codec.scene import parse_scene_track
 from bunraku.codec.scene_decoder import decode_scene_block
 from tests.vectors import scene
@@ -28,9 +29,10 @@ def test_golden_scene_blocks_decode_as_recorded_and_encode_to_the_same_bytes() -
         track, data = tracks[valid["track"]], base64.b64decode(valid["block"])
         assert close(valid, json.loads(json.dumps(scene.block_vector(track, valid["track"], data))))
         header, q = coefficients.decode_coefficients(
-            load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
+            load_shipped_prior(), data, track.block_frames, track.fps, SCENE_LAYOUT
         )
-        assert coefficients.encode_coefficients(load_shipped_prior(), header, q, track.block_frames, track.fps) == data
+        timing = track.block_frames, track.fps
+        assert coefficients.encode_coefficients(load_shipped_prior(), header, q, *timing, SCENE_LAYOUT) == data
 
 
 def test_invalid_scene_blocks_are_refused() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from bunraku.codec import coefficients
 from bunraku.codec._kernels import context_model, range_coder
+from bunraku.codec.channel_layout import MOTION_LAYOUT
 from bunraku.codec.coefficients import BlockHeader
 from bunraku.codec.prior import FREQUENCY_CLASS_OF, HAZARD_ROWS, HAZARD_TABLE_OF, load_shipped_prior
 from bunraku.codec.skeleton_description import MIRROR_OF, MODEL_GROUPS, SkeletonDescription, snap_to_grid
@@ -60,7 +61,7 @@ def trace_block(data: bytes) -> dict[str, Any]:
     count = decoder.decode_bits(frames.bit_length())
     q = np.zeros((CHANNEL_COUNT, 3, count), dtype=np.int64)
     level = coefficients.duration_level(frames, FPS)
-    context = context_model.create_context_model(prior, count, step, level)
+    context = context_model.create_context_model(prior, MOTION_LAYOUT, count, step, level)
     steps: list[dict[str, Any]] = []
     for channel in range(channels):
         for k in range(count):

@@ -12,6 +12,7 @@ import numpy as np
 from bunraku.codec import coefficients, transform
 from bunraku.codec.allocation import select_cheapest
 from bunraku.codec.block_input import BlockInput, KinematicChain, Quantiser, Refinement
+from bunraku.codec.channel_layout import MOTION_LAYOUT
 from bunraku.codec.coefficients import BlockHeader
 from bunraku.codec.motion_track import MotionTrack, step_size
 from bunraku.codec.prior import IntArray, Prior
@@ -93,6 +94,7 @@ class BlockEncoder:
         basis = np.ascontiguousarray(transform.cosine_basis(frames, frames, np.arange(frames, dtype=np.float64)).T)
         return BlockInput(
             self._prior,
+            MOTION_LAYOUT,
             self._costs,
             KinematicChain(
                 track.figure.offsets,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from bunraku.codec.channel_layout import ChannelLayout
 from bunraku.codec.prior import Prior
 from bunraku.motion.rotation import Array
 
@@ -38,6 +39,7 @@ class BlockInput(NamedTuple):
     """
 
     prior: Prior
+    layout: ChannelLayout
     costs: Array
     chain: KinematicChain
     quantiser: Quantiser

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bunraku.codec.channel_layout import MOTION_LAYOUT, ChannelLayout
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import MAGNITUDE_LEVELS, MAX_BLOCK_FRAMES, SCENE_CHANNEL_COUNT, IntArray, Prior
+from bunraku.codec.prior import MAGNITUDE_LEVELS, MAX_BLOCK_FRAMES, IntArray, Prior
 from bunraku.kernels import load_kernels
 from bunraku.motion.skeleton import CHANNEL_COUNT
 
@@ -37,16 +38,24 @@ def duration_level(frames: int, fps: float) -> int:
     return int(MAGNITUDE_LEVELS[min(int(16 * frames / fps + 0.5), 4095)])
 
 
-def encode_coefficients(prior: Prior, header: BlockHeader, q: IntArray, nominal_frames: int, fps: float) -> bytes:
+def encode_coefficients(
+    prior: Prior,
+    header: BlockHeader,
+    q: IntArray,
+    nominal_frames: int,
+    fps: float,
+    layout: ChannelLayout = MOTION_LAYOUT,
+) -> bytes:
     """Encode one block.
 
     Args:
         prior: Prior of the context model; the decoder needs the same.
-        header: Header of the block; the heading of a scene is not encoded.
-        q: Coefficients (19, 3, K) of a motion, or (3, 3, K) of a scene, K <= frames. Trailing frequencies of zeros are
-            free. The second and third axis of a scene's last channel must be zero.
+        header: Header of the block; its heading is encoded only if the layout has one.
+        q: Coefficients (C, 3, K) of the layout's channels, K <= frames. Trailing frequencies of zeros are free. Axes
+            that the layout does not code must be zero.
         nominal_frames: The track's `block_frames`; a block of this length does not spend bits on its length.
         fps: Frames per second.
+        layout: Channels of the block.
 
     Raises:
         ValueError: A coefficient or the block is too large.
@@ -56,9 +65,9 @@ def encode_coefficients(prior: Prior, header: BlockHeader, q: IntArray, nominal_
     q = np.ascontiguousarray(q[:, :, :frequencies], dtype=np.int64)
     kernels = load_kernels("codec")
     out = kernels.allocate_output(q)
-    channels = SCENE_CHANNEL_COUNT if len(q) == SCENE_CHANNEL_COUNT else CHANNEL_COUNT if q[2:].any() else 2
+    channels = 2 if layout.heading and not q[2:].any() else len(q)
     numbers = np.array([header.frames, header.step, header.heading, frequencies, channels], dtype=np.int64)
-    length = kernels.encode_block(prior, q, numbers, nominal_frames, duration_level(header.frames, fps), out)
+    length = kernels.encode_block(prior, layout, q, numbers, nominal_frames, duration_level(header.frames, fps), out)
     if not 0 <= length <= MAX_BLOCK_BYTES:
         raise ValueError("Cannot encode a block: a coefficient is too large. Use a coarser quantiser step.")
     written: bytes = out[1:length].tobytes()
@@ -66,21 +75,22 @@ def encode_coefficients(prior: Prior, header: BlockHeader, q: IntArray, nominal_
 
 
 def decode_coefficients(
-    prior: Prior, data: bytes, nominal_frames: int, fps: float, channels: int = CHANNEL_COUNT
+    prior: Prior, data: bytes, nominal_frames: int, fps: float, layout: ChannelLayout = MOTION_LAYOUT
 ) -> tuple[BlockHeader, IntArray]:
-    """Decode the header and the coefficients (`channels`, 3, K) of a block. Raises `DamagedBlock`."""
+    """Decode the header and the coefficients (C, 3, K) of a block. Raises `DamagedBlock`."""
     if len(data) > MAX_BLOCK_BYTES:
         raise DamagedBlock(f"Invalid block: {len(data)} bytes, at most {MAX_BLOCK_BYTES} are allowed.")
     kernels = load_kernels("codec")
+    channels = len(layout.axes)
     numbers = np.array([0, 0, 0, 0, channels], dtype=np.int64)
     octets = np.array(bytearray(data), dtype=np.uint8)
-    if not kernels.decode_header(octets, nominal_frames, numbers):
+    if not kernels.decode_header(octets, layout, nominal_frames, numbers):
         raise DamagedBlock(
             f"Invalid block: its header has {numbers[0]} frames and {numbers[3]} frequencies, expected "
             f"1..{MAX_BLOCK_FRAMES} frames and at most as many frequencies."
         )
     frames, step, heading, frequencies = map(int, numbers[:4])
     q = np.zeros((channels, 3, frequencies), dtype=np.int64)
-    if not kernels.decode_block(prior, octets, q, numbers, nominal_frames, duration_level(frames, fps)):
+    if not kernels.decode_block(prior, layout, octets, q, numbers, nominal_frames, duration_level(frames, fps)):
         raise DamagedBlock(f"Invalid block: an escape has {kernels.MAX_ESCAPE_BITS} or more unary bits.")
     return BlockHeader(frames, step, heading), q

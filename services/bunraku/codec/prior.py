@@ -14,12 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bunraku.motion.skeleton import CHANNEL_COUNT, JOINTS, PARENTS
+from bunraku.motion.skeleton import CHANNEL_COUNT
 
 IntArray = npt.NDArray[np.int64]
 
-SCENE_CHANNEL_COUNT = 3
-"""Channels of a block of a camera or light, the last with one axis; a motion has `CHANNEL_COUNT`."""
 SHARED_FEATURES = 24
 """Features of a frequency that its three axes share."""
 AXIS_FEATURES = 8
@@ -69,22 +67,6 @@ SHAPES = Prior(
     sign=(FREQUENCY_CLASSES, SIGN_CONTEXTS),  # type: ignore[arg-type]
 )
 """Shape of each array of a `Prior`."""
-
-
-def _relative_channels() -> IntArray:
-    """Return the parent's, mirror's and grandparent's channel of each channel, -1 for none: (3, CHANNEL_COUNT).
-
-    Only earlier channels count. A joint of the right side mirrors one of the left, any other the joint before it.
-    """
-    parent = [-1, 0, *(p + 1 for p in PARENTS[1:])]
-    mirror = [-1, -1]
-    for k, name in enumerate(JOINTS[1:], 1):
-        mirror.append(JOINTS.index("l" + name[1:]) + 1 if name.startswith("r_") else k)
-    grandparent = [parent[p] if p >= 0 else -1 for p in parent]
-    return np.array([parent, mirror, grandparent], dtype=np.int64)
-
-
-RELATIVE_CHANNELS: IntArray = _relative_channels()
 
 
 def _magnitude_level(magnitude: int) -> int:

@@ -14,12 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.prior import SCENE_CHANNEL_COUNT
 from bunraku.codec.timing import Timing, parse_timing
 from bunraku.motion.rotation import Array
 
 SCENE_CODEC = "bunraku.scene/1"
 SCENE_VALUE_COUNT = 7
+SCENE_CHANNEL_COUNT = 3
+"""Channels of a camera or light, the last with one axis."""
 CHANNEL_OF = np.array([0, 0, 0, 1, 1, 1, 2])
 """Channel of each value; the other two axes of the last channel are zero."""
 AXIS_OF = np.array([0, 1, 2, 0, 1, 2, 0])

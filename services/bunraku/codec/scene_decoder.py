@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.codec import coefficients, transform
+from bunraku.codec.channel_layout import SCENE_LAYOUT
 from bunraku.codec.motion_decoder import reconstruct
 from bunraku.codec.motion_track import step_size
-from bunraku.codec.prior import SCENE_CHANNEL_COUNT, IntArray, Prior, load_shipped_prior
+from bunraku.codec.prior import IntArray, Prior, load_shipped_prior
 from bunraku.codec.scene import SceneTrack
 from bunraku.motion.rotation import Array
 
@@ -38,6 +39,6 @@ def decode_scene_block(track: SceneTrack, data: bytes, prior: Prior | None = Non
     `prior` must be the one with which the block was encoded; the default is the shipped prior.
     """
     header, q = coefficients.decode_coefficients(
-        prior or load_shipped_prior(), data, track.block_frames, track.fps, SCENE_CHANNEL_COUNT
+        prior or load_shipped_prior(), data, track.block_frames, track.fps, SCENE_LAYOUT
     )
     return SceneBlock(track, header.frames, q, reconstruct(q) * step_size(header.step, header.frames))

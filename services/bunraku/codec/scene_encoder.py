@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.codec import coefficients, transform
+from bunraku.codec.channel_layout import SCENE_LAYOUT
 from bunraku.codec.coefficients import BlockHeader
 from bunraku.codec.motion_decoder import reconstruct
 from bunraku.codec.motion_encoder import BitrateLevel
@@ -99,7 +100,8 @@ def _encode_scene_block(
         if step is None:
             continue
         header = BlockHeader(frames, step, 0)
-        data = coefficients.encode_coefficients(prior, header, search.quantise(step), track.block_frames, track.fps)
+        q = search.quantise(step)
+        data = coefficients.encode_coefficients(prior, header, q, track.block_frames, track.fps, SCENE_LAYOUT)
         if measure_scene_error(track, scene, index, data, prior).max() <= error_bound_mm:
             candidates.append(data)
     if not candidates:

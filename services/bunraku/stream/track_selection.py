@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.container import StoredMotion, Track
 from bunraku.codec.motion_track import MotionTrack
-from bunraku.codec.prior import SCENE_CHANNEL_COUNT
-from bunraku.codec.scene import SceneTrack
+from bunraku.codec.scene import SCENE_CHANNEL_COUNT, SceneTrack
 from bunraku.delivery import allocation
 from bunraku.delivery.block_scheduler import ScheduledTrack
 from bunraku.delivery.resume import ResumeState

@@ -130,7 +130,7 @@ def quantise_closed_loop(block: BlockInput, q: IntArray) -> Array:
     """Quantise a block into `q` (19, 3, K); return the decoded points (23, n, 3)."""
     chain, quantiser = block.chain, block.quantiser
     frequencies, frames = quantiser.basis.shape
-    context = create_context_model(block.prior, frequencies, quantiser.step, block.duration_level)
+    context = create_context_model(block.prior, block.layout, frequencies, quantiser.step, block.duration_level)
     pose = create_pose(frames)
     orientation, points = pose.orientation, pose.points
     weighted = np.zeros((frames, 3))

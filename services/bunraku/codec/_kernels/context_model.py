@@ -1,6 +1,6 @@
 """Context model: predicts the scale of the next coefficient from those already coded (proto/codec.md, 2.10 and 2.11).
 
-Coefficients are int64 (19, 3, K): channel, axis, frequency. They are coded channel by channel, frequency by frequency,
+Coefficients are int64 (C, 3, K): channel, axis, frequency. They are coded channel by channel, frequency by frequency,
 axis by axis. All arithmetic is in integers, so that Python and TypeScript decode the same bits.
 """
 
@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from bunraku.codec.channel_layout import GRANDPARENT, MIRROR, PARENT, ChannelLayout
 from bunraku.codec.prior import (
     FEATURE_COUNT,
     FREQUENCY_CLASS_OF,
     HIDDEN_UNITS,
     MAGNITUDE_LEVELS,
-    RELATIVE_CHANNELS,
     SHARED_FEATURES,
     IntArray,
     Prior,
@@ -27,21 +27,20 @@ MIN_SCALE = -7 * 256
 MAX_SCALE = 14 * 256
 _PADDING_BEFORE = 3
 _PADDING_TOTAL = 8
-PARENT, MIRROR, GRANDPARENT = range(3)
-"""Rows of `RELATIVE_CHANNELS`."""
 
 
 class ContextModel(NamedTuple):
     """Magnitude levels of the coefficients of one block that are already coded.
 
-    `frequencies` (K), the `step` index and `duration_level` describe the block. `axis_levels` (19, 3, K + 8) are the
-    levels of the coefficients, `mean_levels` (19, K + 8) their means over the axes, `level_totals` (K + 8) the sums of
+    `frequencies` (K), the `step` index and `duration_level` describe the block. `axis_levels` (C, 3, K + 8) are the
+    levels of the coefficients, `mean_levels` (C, K + 8) their means over the axes, `level_totals` (K + 8) the sums of
     these over the finished channels: three zeros come before the frequencies and five after. `running_sums` (K + 1)
     are the sums of this channel's means below each frequency. `shared_sums` (1 + HIDDEN_UNITS) and `features` (32)
     are buffers.
     """
 
     prior: Prior
+    layout: ChannelLayout
     frequencies: int
     step: int
     duration_level: int
@@ -54,15 +53,19 @@ class ContextModel(NamedTuple):
 
 
 @njit(cache=True)
-def create_context_model(prior: Prior, frequencies: int, step: int, duration_level: int) -> ContextModel:
+def create_context_model(
+    prior: Prior, layout: ChannelLayout, frequencies: int, step: int, duration_level: int
+) -> ContextModel:
     """Return the context model of a block of which nothing is coded."""
+    channels = len(layout.axes)
     return ContextModel(
         prior,
+        layout,
         frequencies,
         step,
         duration_level,
-        np.zeros((19, 3, frequencies + _PADDING_TOTAL), np.int64),
-        np.zeros((19, frequencies + _PADDING_TOTAL), np.int64),
+        np.zeros((channels, 3, frequencies + _PADDING_TOTAL), np.int64),
+        np.zeros((channels, frequencies + _PADDING_TOTAL), np.int64),
         np.zeros(frequencies + _PADDING_TOTAL, np.int64),
         np.zeros(frequencies + 1, np.int64),
         np.zeros(1 + HIDDEN_UNITS, np.int64),
@@ -83,7 +86,7 @@ def compute_shared_sums(context: ContextModel, channel: int, k: int) -> None:
     f, mean, total, kk = context.features, context.mean_levels, context.level_totals, k + _PADDING_BEFORE
     f[0], f[1], f[2] = mean[channel, kk - 1], mean[channel, kk - 2], mean[channel, kk - 3]
     for relation in (PARENT, MIRROR):
-        relative = RELATIVE_CHANNELS[relation, channel]
+        relative = context.layout.relatives[relation, channel]
         first = 3 + 4 * relation
         if relative >= 0:
             m = mean[relative]
@@ -91,7 +94,7 @@ def compute_shared_sums(context: ContextModel, channel: int, k: int) -> None:
             f[first + 3] = (m[kk + 2] + m[kk + 3] + m[kk + 4]) // 3
         else:
             f[first], f[first + 1], f[first + 2], f[first + 3] = 0, 0, 0, 0
-    grandparent = RELATIVE_CHANNELS[GRANDPARENT, channel]
+    grandparent = context.layout.relatives[GRANDPARENT, channel]
     if grandparent >= 0:
         f[11] = mean[grandparent, kk]
         f[12] = (mean[grandparent, kk + 1] + mean[grandparent, kk + 2]) >> 1
@@ -126,8 +129,8 @@ def predict_scale(context: ContextModel, channel: int, axis: int, k: int) -> int
     prior, f, kk = context.prior, context.features, k + _PADDING_BEFORE
     own, parent, mirror = (
         context.axis_levels[channel, axis],
-        RELATIVE_CHANNELS[PARENT, channel],
-        RELATIVE_CHANNELS[MIRROR, channel],
+        context.layout.relatives[PARENT, channel],
+        context.layout.relatives[MIRROR, channel],
     )
     f[24], f[25], f[26] = own[kk - 1], own[kk - 2], own[kk - 3]
     f[27] = context.axis_levels[channel, 0, kk] if axis > 0 else 0
@@ -135,13 +138,13 @@ def predict_scale(context: ContextModel, channel: int, axis: int, k: int) -> int
     f[29] = context.axis_levels[parent, axis, kk] if parent >= 0 else 0
     f[30] = context.axis_levels[mirror, axis, kk] if mirror >= 0 else 0
     f[31] = context.axis_levels[mirror, axis, kk + 1] if mirror >= 0 else 0
-    frequency_class, channel_axis = FREQUENCY_CLASS_OF[k], 3 * channel + axis
-    linear = context.shared_sums[0] + prior.bias[frequency_class, channel_axis]
+    frequency_class, prior_axis = FREQUENCY_CLASS_OF[k], 3 * context.layout.prior_channels[channel] + axis
+    linear = context.shared_sums[0] + prior.bias[frequency_class, prior_axis]
     for i in range(SHARED_FEATURES, FEATURE_COUNT):
         linear += f[i] * prior.linear[frequency_class, i]
     scale = linear >> 8
     for unit in range(HIDDEN_UNITS):
-        x = context.shared_sums[1 + unit] + prior.hidden_bias[unit, channel_axis]
+        x = context.shared_sums[1 + unit] + prior.hidden_bias[unit, prior_axis]
         for i in range(SHARED_FEATURES, FEATURE_COUNT):
             x += f[i] * prior.hidden[unit, i]
         if x > 0:

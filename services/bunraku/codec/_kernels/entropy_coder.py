@@ -28,13 +28,13 @@ from bunraku.codec._kernels.range_coder import (
     start_decoder,
     start_encoder,
 )
+from bunraku.codec.channel_layout import ChannelLayout
 from bunraku.codec.prior import (
     FEATURE_COUNT,
     FREQUENCY_CLASS_OF,
     HAZARD_ROWS,
     HAZARD_TABLE_OF,
     MAX_BLOCK_FRAMES,
-    SCENE_CHANNEL_COUNT,
     UNARY_DECISIONS,
     IntArray,
     Prior,
@@ -49,8 +49,8 @@ _ROOT_ONLY_PROBABILITY = 512
 HEADER_FRAMES, HEADER_STEP, HEADER_HEADING, HEADER_FREQUENCIES, HEADER_CHANNELS = range(5)
 """Indices into a header: frames, step index, heading (-32..31), frequencies, and coded channels.
 
-Channels are 19, or 2 if all joints keep their reference. Those of a scene are always 3; its block contains neither them
-nor a heading.
+Channels of a layout with a heading may be 2 if all joints keep their reference. Blocks of other layouts contain neither
+them nor a heading.
 """
 LABEL_CLASS, LABEL_CHANNEL_AXIS, LABEL_MAGNITUDE, LABEL_SIGN, LABEL_SIGN_CONTEXT = range(5)
 """Columns of a training example's label; the sign is 0 for none, 1 for plus, 2 for minus."""
@@ -90,7 +90,7 @@ def bit_length(value: int) -> int:
 
 
 @njit(cache=True)
-def _code_header(coder: BitCoder, nominal_frames: int, header: IntArray) -> bool:
+def _code_header(coder: BitCoder, layout: ChannelLayout, nominal_frames: int, header: IntArray) -> bool:
     """Code a block's header; return False if it is invalid."""
     if _code_bit(coder, _NOMINAL_FRAMES_PROBABILITY, 1 if header[HEADER_FRAMES] == nominal_frames else 0):
         header[HEADER_FRAMES] = nominal_frames
@@ -98,12 +98,11 @@ def _code_header(coder: BitCoder, nominal_frames: int, header: IntArray) -> bool
         header[HEADER_FRAMES] = _code_bits(coder, _FRAME_COUNT_BITS, header[HEADER_FRAMES])
     if not 1 <= header[HEADER_FRAMES] <= MAX_BLOCK_FRAMES:
         return False
-    is_scene = header[HEADER_CHANNELS] == SCENE_CHANNEL_COUNT
-    if not is_scene:
+    if layout.heading:
         root_only = _code_bit(coder, _ROOT_ONLY_PROBABILITY, 1 if header[HEADER_CHANNELS] == 2 else 0)
-        header[HEADER_CHANNELS] = 2 if root_only else 19
+        header[HEADER_CHANNELS] = 2 if root_only else len(layout.axes)
     header[HEADER_STEP] = _code_bits(coder, 8, header[HEADER_STEP])
-    if not is_scene:
+    if layout.heading:
         header[HEADER_HEADING] = _code_bits(coder, 6, header[HEADER_HEADING] + 32) - 32
     header[HEADER_FREQUENCIES] = _code_bits(coder, bit_length(header[HEADER_FRAMES]), header[HEADER_FREQUENCIES])
     return header[HEADER_FREQUENCIES] <= header[HEADER_FRAMES]  # type: ignore[no-any-return]
@@ -136,12 +135,14 @@ def _code_magnitude(coder: BitCoder, hazard: IntArray, frequency_class: int, sca
 
 
 @njit(cache=True)
-def _code_coefficients(coder: BitCoder, prior: Prior, q: IntArray, header: IntArray, duration_level: int) -> bool:
+def _code_coefficients(
+    coder: BitCoder, prior: Prior, layout: ChannelLayout, q: IntArray, header: IntArray, duration_level: int
+) -> bool:
     """Code the coefficients of a block; return False if one is invalid."""
     channels, frequencies = header[HEADER_CHANNELS], header[HEADER_FREQUENCIES]
-    context = create_context_model(prior, frequencies, header[HEADER_STEP], duration_level)
+    context = create_context_model(prior, layout, frequencies, header[HEADER_STEP], duration_level)
     for channel in range(channels):
-        axes = 1 if channel == 2 and channels == SCENE_CHANNEL_COUNT else 3
+        axes = layout.axes[channel]
         for k in range(frequencies):
             compute_shared_sums(context, channel, k)
             for axis in range(axes):
@@ -161,37 +162,53 @@ def _code_coefficients(coder: BitCoder, prior: Prior, q: IntArray, header: IntAr
 
 @njit(cache=True, nogil=True)
 def encode_block(
-    prior: Prior, q: IntArray, header: IntArray, nominal_frames: int, duration_level: int, out: ByteArray
+    prior: Prior,
+    layout: ChannelLayout,
+    q: IntArray,
+    header: IntArray,
+    nominal_frames: int,
+    duration_level: int,
+    out: ByteArray,
 ) -> int:
     """Write a block into `out` and return its length, or -1 if a coefficient is too large.
 
     The first byte is always zero and not part of the block.
     """
     coder = BitCoder(False, start_encoder(), out)
-    if not _code_header(coder, nominal_frames, header) or not _code_coefficients(
-        coder, prior, q, header, duration_level
+    if not _code_header(coder, layout, nominal_frames, header) or not _code_coefficients(
+        coder, prior, layout, q, header, duration_level
     ):
         return -1
     return finish_encoder(coder.state, out)
 
 
 @njit(cache=True)
-def decode_header(data: ByteArray, nominal_frames: int, header: IntArray) -> bool:
+def decode_header(data: ByteArray, layout: ChannelLayout, nominal_frames: int, header: IntArray) -> bool:
     """Read only the header of a block; return False if it is invalid."""
-    return _code_header(BitCoder(True, start_decoder(data), data), nominal_frames, header)
+    return _code_header(BitCoder(True, start_decoder(data), data), layout, nominal_frames, header)
 
 
 @njit(cache=True, nogil=True)
 def decode_block(
-    prior: Prior, data: ByteArray, q: IntArray, header: IntArray, nominal_frames: int, duration_level: int
+    prior: Prior,
+    layout: ChannelLayout,
+    data: ByteArray,
+    q: IntArray,
+    header: IntArray,
+    nominal_frames: int,
+    duration_level: int,
 ) -> bool:
     """Read a block into `q`, zeros of (channels, 3, frequencies); return False if it is invalid."""
     coder = BitCoder(True, start_decoder(data), data)
-    return _code_header(coder, nominal_frames, header) and _code_coefficients(coder, prior, q, header, duration_level)
+    return _code_header(coder, layout, nominal_frames, header) and _code_coefficients(
+        coder, prior, layout, q, header, duration_level
+    )
 
 
 @njit(cache=True)
-def collect_examples(prior: Prior, q: IntArray, header: IntArray, duration_level: int) -> tuple[IntArray, IntArray]:
+def collect_examples(
+    prior: Prior, layout: ChannelLayout, q: IntArray, header: IntArray, duration_level: int
+) -> tuple[IntArray, IntArray]:
     """Return the training examples of a motion block, in the order in which its coefficients are coded.
 
     Returns:
@@ -199,7 +216,7 @@ def collect_examples(prior: Prior, q: IntArray, header: IntArray, duration_level
     """
     frequencies, row = header[HEADER_FREQUENCIES], 0
     features, labels = np.zeros((q.size, FEATURE_COUNT), np.int64), np.zeros((q.size, 5), np.int64)
-    context = create_context_model(prior, frequencies, header[HEADER_STEP], duration_level)
+    context = create_context_model(prior, layout, frequencies, header[HEADER_STEP], duration_level)
     for channel in range(header[HEADER_CHANNELS]):
         for k in range(frequencies):
             compute_shared_sums(context, channel, k)

@@ -295,7 +295,7 @@ def _start_sweep(block: BlockInput, q: IntArray, bit_price: float) -> Sweep:
     A channel that is coded later therefore counts as it was before the sweep.
     """
     used = _count_used_frequencies(q)
-    context = create_context_model(block.prior, used, block.quantiser.step, block.duration_level)
+    context = create_context_model(block.prior, block.layout, used, block.quantiser.step, block.duration_level)
     for channel in range(19):
         for k in range(used):
             for axis in range(3):
