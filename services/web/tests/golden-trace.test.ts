@@ -1,4 +1,5 @@
 import { expect, test } from "vitest";
+import { MOTION_LAYOUT } from "../src/codec/channel-layout";
 import { decodeCoefficients, durationLevel } from "../src/codec/coefficients";
 import { ContextModel } from "../src/codec/context-model";
 import { loadShippedPrior } from "../src/codec/prior";
@@ -57,7 +58,13 @@ test("the traced block decodes to the recorded header and coefficients", () => {
 });
 
 test("features and scales are those recorded for each coefficient", () => {
-  const context = new ContextModel(loadShippedPrior(), block.count, block.step, durationLevel(block.frames, block.fps));
+  const context = new ContextModel(
+    loadShippedPrior(),
+    MOTION_LAYOUT,
+    block.count,
+    block.step,
+    durationLevel(block.frames, block.fps),
+  );
   const { features } = context as unknown as { features: Float64Array };
   block.coefficients.forEach(({ channel, frequency, axis, features: recorded, e, q }) => {
     if (axis === 0) context.computeSharedSums(channel, frequency);

@@ -3,7 +3,7 @@
  * as `codec/_kernels/entropy_coder.py`.
  */
 
-import { CHANNEL_COUNT } from "../motion/skeleton";
+import { type ChannelLayout, MOTION_LAYOUT } from "./channel-layout";
 import { ContextModel, FREQUENCY_CLASS_OF, signContext } from "./context-model";
 import { DamagedBlock } from "./errors";
 import { magnitudeLevel } from "./magnitude-level";
@@ -24,15 +24,12 @@ const HAZARD_OFFSET_OF = Uint16Array.from(
   (frequencyClass) => HAZARD_TABLE_OF[frequencyClass] * HAZARD_ROWS * UNARY_DECISIONS,
 );
 
-/** Channels of a block of a camera or light, the last with one axis; a motion has 19. */
-export const SCENE_CHANNEL_COUNT = 3;
-
 /** Header and quantised coefficients of a block. */
 export interface BlockCoefficients {
   frames: number;
   /** Step index, 0..255. */
   step: number;
-  /** Rotation about y, in 1/64 of a turn, that the root's rotations are relative to, -32..31; 0 for a scene. */
+  /** Rotation about y, in 1/64 of a turn, that the root's rotations are relative to, -32..31; 0 in other layouts than a motion's. */
   heading: number;
   /** Frequencies of each axis. */
   count: number;
@@ -49,7 +46,7 @@ export function durationLevel(frames: number, fps: number): number {
  * Decodes one block. The work is bounded by 29,184 coefficients of at most 70 bits.
  *
  * @param nominalFrames the track's `blockFrames`
- * @param channelCount `SCENE_CHANNEL_COUNT` for a scene, whose header has neither channels nor a heading
+ * @param layout channels of the block
  * @throws DamagedBlock
  */
 export function decodeCoefficients(
@@ -57,7 +54,7 @@ export function decodeCoefficients(
   data: Uint8Array,
   nominalFrames: number,
   fps: number,
-  channelCount = CHANNEL_COUNT,
+  layout: ChannelLayout = MOTION_LAYOUT,
 ): BlockCoefficients {
   if (data.length > MAX_BLOCK_BYTES) {
     throw new DamagedBlock(`Invalid block: ${data.length} bytes, at most ${MAX_BLOCK_BYTES} are allowed.`);
@@ -67,16 +64,15 @@ export function decodeCoefficients(
   if (frames < 1 || frames > MAX_BLOCK_FRAMES) {
     throw new DamagedBlock(`Invalid block: ${frames} frames, expected 1..${MAX_BLOCK_FRAMES}.`);
   }
-  const isScene = channelCount === SCENE_CHANNEL_COUNT;
-  const channels = !isScene && decoder.decodeBit(ROOT_ONLY_PROBABILITY) ? 2 : channelCount;
+  const channels = layout.heading && decoder.decodeBit(ROOT_ONLY_PROBABILITY) ? 2 : layout.count;
   const step = decoder.decodeBits(8);
-  const heading = isScene ? 0 : decoder.decodeBits(6) - 32;
+  const heading = layout.heading ? decoder.decodeBits(6) - 32 : 0;
   const count = decoder.decodeBits(32 - Math.clz32(frames));
   if (count > frames) throw new DamagedBlock(`Invalid block: ${count} frequencies for ${frames} frames.`);
-  const q = new Float64Array(channelCount * 3 * count);
-  const context = new ContextModel(prior, count, step, durationLevel(frames, fps));
+  const q = new Float64Array(layout.count * 3 * count);
+  const context = new ContextModel(prior, layout, count, step, durationLevel(frames, fps));
   for (let channel = 0; channel < channels; channel++) {
-    const axes = isScene && channel === 2 ? 1 : 3;
+    const axes = layout.axes[channel];
     for (let k = 0; k < count; k++) {
       context.computeSharedSums(channel, k);
       for (let axis = 0; axis < axes; axis++) {

@@ -4,7 +4,7 @@
  * `codec/_kernels/context_model.py`.
  */
 
-import { CHANNEL_COUNT, JOINTS, PARENTS } from "../motion/skeleton";
+import type { ChannelLayout } from "./channel-layout";
 import { magnitudeLevels } from "./magnitude-level";
 import { CHANNEL_AXES, FEATURE_COUNT, HIDDEN_UNITS, type Prior, SHARED_FEATURES, SUM_COUNT } from "./prior";
 
@@ -17,26 +17,6 @@ export const FREQUENCY_CLASS_OF = Uint8Array.from(
   { length: 513 },
   (_, k) => [1, 2, 3, 5, 9, 16].filter((first) => k >= first).length,
 );
-
-// a missing channel reads as zeros
-const NO_CHANNEL = CHANNEL_COUNT;
-
-const PARENT = [NO_CHANNEL, 0, ...PARENTS.slice(1).map((joint) => joint + 1)];
-const MIRROR = [
-  NO_CHANNEL,
-  NO_CHANNEL,
-  ...JOINTS.slice(1).map((name, previous) =>
-    name.startsWith("r_") ? JOINTS.indexOf(`l${name.slice(1)}`) + 1 : previous + 1,
-  ),
-];
-
-/** Parent's, mirror's and grandparent's channel of each channel, 19 for none. Only earlier channels count. */
-export const RELATIVE_CHANNELS = {
-  parent: Uint8Array.from(PARENT),
-  mirror: Uint8Array.from(MIRROR),
-  grandparent: Uint8Array.from(PARENT, (parent) => (parent === NO_CHANNEL ? NO_CHANNEL : PARENT[parent])),
-} as const;
-const { parent: PARENT_OF, mirror: MIRROR_OF, grandparent: GRANDPARENT_OF } = RELATIVE_CHANNELS;
 
 const ZERO_SUMS = new Float64Array(SUM_COUNT);
 
@@ -65,30 +45,33 @@ export class ContextModel {
   private readonly magnitudeLevels = magnitudeLevels();
 
   /**
+   * @param layout channels of the block
    * @param count frequencies of the block
    * @param step step index of the block
    * @param durationLevel level of its duration
    */
   constructor(
     private readonly prior: Prior,
+    private readonly layout: ChannelLayout,
     private readonly count: number,
     private readonly step: number,
     private readonly durationLevel: number,
   ) {
     this.width = count + PADDING_TOTAL;
-    this.axisLevels = new Int32Array((CHANNEL_COUNT + 1) * 3 * this.width);
-    this.meanLevels = new Int32Array((CHANNEL_COUNT + 1) * this.width);
+    // a missing relative reads as zeros
+    this.axisLevels = new Int32Array((layout.count + 1) * 3 * this.width);
+    this.meanLevels = new Int32Array((layout.count + 1) * this.width);
     this.levelTotals = new Int32Array(this.width);
   }
 
   /** Computes the features and sums that the three axes of frequency `k` share. */
   computeSharedSums(channel: number, k: number): void {
-    const { features: f, meanLevels: means, levelTotals: totals, width, sharedSums: shared } = this;
+    const { features: f, meanLevels: means, levelTotals: totals, width, sharedSums: shared, layout } = this;
     const at = k + PADDING_BEFORE;
     const own = channel * width + at;
-    const parent = PARENT_OF[channel] * width + at;
-    const mirror = MIRROR_OF[channel] * width + at;
-    const grandparent = GRANDPARENT_OF[channel] * width + at;
+    const parent = layout.parents[channel] * width + at;
+    const mirror = layout.mirrors[channel] * width + at;
+    const grandparent = layout.grandparents[channel] * width + at;
     const done = channel > 1 ? channel : 1;
     if (k === 0) this.runningSum = 0;
     f[0] = means[own - 1];
@@ -130,13 +113,13 @@ export class ContextModel {
 
   /** Returns the predicted scale of one coefficient, log2 in 1/256, after `computeSharedSums` of its frequency. */
   predictScale(channel: number, axis: number, k: number): number {
-    const { features: f, axisLevels: axes, width, sharedSums: shared, sums } = this;
+    const { features: f, axisLevels: axes, width, sharedSums: shared, sums, layout } = this;
     const { weights, biases, out } = this.prior;
     const at = k + PADDING_BEFORE;
     const first = channel * 3 * width + at;
     const own = first + axis * width;
-    const parent = (PARENT_OF[channel] * 3 + axis) * width + at;
-    const mirror = (MIRROR_OF[channel] * 3 + axis) * width + at;
+    const parent = (layout.parents[channel] * 3 + axis) * width + at;
+    const mirror = (layout.mirrors[channel] * 3 + axis) * width + at;
     f[24] = axes[own - 1];
     f[25] = axes[own - 2];
     f[26] = axes[own - 3];
@@ -147,7 +130,7 @@ export class ContextModel {
     f[30] = axes[mirror];
     f[31] = axes[mirror + 1];
     const z = FREQUENCY_CLASS_OF[k];
-    const bias = (z * CHANNEL_AXES + channel * 3 + axis) * SUM_COUNT;
+    const bias = (z * CHANNEL_AXES + layout.priorChannels[channel] * 3 + axis) * SUM_COUNT;
     accumulateSums(
       sums,
       shared,

@@ -5,7 +5,8 @@
  * vertical field of view 6 in radians; of a light its colour 3-5 in linear RGB and its intensity 6.
  */
 
-import { decodeCoefficients, SCENE_CHANNEL_COUNT } from "./coefficients";
+import { SCENE_LAYOUT } from "./channel-layout";
+import { decodeCoefficients } from "./coefficients";
 import { DamagedBlock } from "./errors";
 import { reconstruct, stepSize } from "./motion-decoder";
 import { loadShippedPrior, type Prior } from "./prior";
@@ -110,7 +111,7 @@ export class SceneBlock {
  * @throws DamagedBlock
  */
 export function decodeSceneBlock(track: SceneTrack, data: Uint8Array, prior: Prior = loadShippedPrior()): SceneBlock {
-  const { frames, step, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps, SCENE_CHANNEL_COUNT);
+  const { frames, step, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps, SCENE_LAYOUT);
   const size = stepSize(step, frames);
   // the other two axes of the last channel are zero
   const values = new Float64Array(SCENE_VALUE_COUNT * count);

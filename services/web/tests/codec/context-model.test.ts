@@ -1,13 +1,7 @@
 import * as fc from "fast-check";
 import { expect, test } from "vitest";
-import {
-  ContextModel,
-  FREQUENCY_CLASS_OF,
-  MAX_SCALE,
-  MIN_SCALE,
-  RELATIVE_CHANNELS,
-  signContext,
-} from "../../src/codec/context-model";
+import { MOTION_LAYOUT } from "../../src/codec/channel-layout";
+import { ContextModel, FREQUENCY_CLASS_OF, MAX_SCALE, MIN_SCALE, signContext } from "../../src/codec/context-model";
 import { magnitudeLevel } from "../../src/codec/magnitude-level";
 import {
   CHANNEL_AXES,
@@ -20,25 +14,6 @@ import {
   SIGN_CONTEXTS,
   UNARY_DECISIONS,
 } from "../../src/codec/prior";
-import { JOINTS } from "../../src/motion/skeleton";
-
-/** Returns the joint of a channel, or that it is the root's position. */
-const channelName = (channel: number) => (channel === 0 ? "position" : channel === 19 ? "none" : JOINTS[channel - 1]);
-
-test("relative channels follow the skeleton", () => {
-  const relativesOf = (channel: number) =>
-    [RELATIVE_CHANNELS.parent, RELATIVE_CHANNELS.mirror, RELATIVE_CHANNELS.grandparent].map((relation) =>
-      channelName(relation[channel]),
-    );
-  expect(relativesOf(0)).toEqual(["none", "none", "none"]);
-  expect(relativesOf(1)).toEqual(["position", "none", "none"]);
-  expect(relativesOf(2)).toEqual(["humanoid_root", "humanoid_root", "position"]);
-  expect(relativesOf(JOINTS.indexOf("r_knee") + 1)).toEqual(["r_hip", "l_knee", "sacroiliac"]);
-  expect(relativesOf(JOINTS.indexOf("l_elbow") + 1)).toEqual(["l_shoulder", "l_shoulder", "vl5"]);
-  for (const relatives of Object.values(RELATIVE_CHANNELS)) {
-    relatives.forEach((relative, channel) => expect(relative < channel || relative === 19).toBe(true));
-  }
-});
 
 test("frequency classes", () => {
   expect([0, 1, 2, 3, 4, 5, 8, 9, 15, 16, 512].map((k) => FREQUENCY_CLASS_OF[k])).toEqual([
@@ -70,7 +45,7 @@ function referenceScale(
   const sum = (n: number, term: (i: number) => number) =>
     Array.from({ length: n }, (_, i) => term(i)).reduce((x, y) => x + y, 0);
   const T = (f: number) => sum(c, (channel) => M(channel, f));
-  const [p, m, g] = [RELATIVE_CHANNELS.parent[c], RELATIVE_CHANNELS.mirror[c], RELATIVE_CHANNELS.grandparent[c]];
+  const [p, m, g] = [MOTION_LAYOUT.parents[c], MOTION_LAYOUT.mirrors[c], MOTION_LAYOUT.grandparents[c]];
   const d = Math.max(c, 1);
   const relativeFeatures = (r: number) => [
     M(r, k),
@@ -144,7 +119,7 @@ test("scale equals its definition for any prior and magnitudes", () => {
       (values, stream, count, step, durationLevel) => {
         const drawn = Array.from({ length: CHANNEL_AXES * count }, () => stream.next().value as number);
         const magnitude = (c: number, a: number, k: number) => drawn[(c * 3 + a) * count + k];
-        const context = new ContextModel(parsePrior(values), count, step, durationLevel);
+        const context = new ContextModel(parsePrior(values), MOTION_LAYOUT, count, step, durationLevel);
         let index = 0;
         for (let channel = 0; channel < 19; channel++) {
           for (let k = 0; k < count; k++) {
@@ -186,6 +161,7 @@ test("scale is within its limits", () => {
   ]) {
     const context = new ContextModel(
       parsePrior({ ...values, bias: flat(FREQUENCY_CLASSES, CHANNEL_AXES, bias) }),
+      MOTION_LAYOUT,
       1,
       0,
       0,

@@ -1,6 +1,7 @@
 import * as fc from "fast-check";
 import { describe, expect, test } from "vitest";
-import { decodeCoefficients, SCENE_CHANNEL_COUNT } from "../../src/codec/coefficients";
+import { SCENE_LAYOUT } from "../../src/codec/channel-layout";
+import { decodeCoefficients } from "../../src/codec/coefficients";
 import { DamagedBlock } from "../../src/codec/errors";
 import { loadShippedPrior } from "../../src/codec/prior";
 import { decodeSceneBlock, SCENE_VALUE_COUNT, SceneTrack } from "../../src/codec/scene";
@@ -31,7 +32,7 @@ describe("golden blocks", () => {
       decodeBase64(vector.block),
       track.blockFrames,
       track.fps,
-      SCENE_CHANNEL_COUNT,
+      SCENE_LAYOUT,
     );
     expect([frames, step, heading]).toEqual([vector.frames, vector.step, 0]);
     expect([...q]).toEqual(vector.q);
