@@ -94,21 +94,21 @@ def test_camera_matches_scene_and_is_none_if_block_is_missing() -> None:
     scene = sample_camera(4.0, 30.0)
     _, store = filled_scene_store(scene, 2)
     for frame in (0, 17, 29, 30, 59, 90, 119):
-        values = store.scene_at(round(frame * 1e6 / 30), True, 4_000_000)
+        values = store.values_at(round(frame * 1e6 / 30), True, 4_000_000)
         assert values is not None
         np.testing.assert_allclose(values, scene.values[frame], atol=2e-3)
-    assert store.scene_at(2_500_000, True, 4_000_000) is None
+    assert store.values_at(2_500_000, True, 4_000_000) is None
 
 
 def test_camera_is_interpolated_between_blocks_and_at_loop_end() -> None:
     scene = sample_camera(4.0, 30.0)
     _, store = filled_scene_store(scene)
     for before, after in ((29, 30), (119, 0)):
-        quarter = store.scene_at(round((before + 0.25) * 1e6 / 30), True, 4_000_000)
+        quarter = store.values_at(round((before + 0.25) * 1e6 / 30), True, 4_000_000)
         assert quarter is not None
         truth = 0.75 * scene.values[before] + 0.25 * scene.values[after]
         np.testing.assert_allclose(quarter, truth, atol=2e-3)
-    last = store.scene_at(4_000_000, False, 4_000_000)
+    last = store.values_at(4_000_000, False, 4_000_000)
     assert last is not None
     np.testing.assert_allclose(last, scene.values[-1], atol=0.02)
 
@@ -117,7 +117,7 @@ def test_shorter_camera_is_constant_past_its_end() -> None:
     scene = sample_camera(2.0, 30.0)
     _, store = filled_scene_store(scene)
     for position in (1_980_000, 2_000_000, 2_400_000, 3_999_999):
-        values = store.scene_at(position, True, 4_000_000)
+        values = store.values_at(position, True, 4_000_000)
         assert values is not None
         np.testing.assert_allclose(values, scene.values[-1], atol=0.02)
 

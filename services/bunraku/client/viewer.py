@@ -17,16 +17,19 @@ from bunraku.client.viewer_statistics import ViewerStatistics
 from bunraku.codec import motion_decoder
 from bunraku.codec.audio import AudioPacket, AudioTrack
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension_track import decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.delivery.resume import MAX_BLOCKS, HeldBlocks, ResumeState
+from bunraku.motion.extension import ExtendedPose, extend_pose
 from bunraku.motion.rotation import Array
+from bunraku.motion.skeleton import world_transforms
 from bunraku.playout import timeline
 from bunraku.playout.audio_store import AudioBlockStore
-from bunraku.playout.block_store import MotionBlockStore, Pose, SceneBlockStore
+from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, Pose, SceneBlockStore
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.live_buffer import LiveBuffer
@@ -186,6 +189,24 @@ class Viewer:
         root, rotations = tracks.placements[performer].apply(*pose)
         return root, self._overlays.apply(rotations, reference, performer)
 
+    def extended_pose_at(self, reference: int, performer: int = 0) -> ExtendedPose | None:
+        """Return the world positions and orientations of all joints of a performer, of the extension too.
+
+        None if the stream has no extension of the performer (`tracks=` in its URL asks for them), or a block is
+        missing. The arrays have one instant.
+        """
+        state, tracks = self.timeline_history.at(reference), self._tracks
+        pose = self.pose_at(reference, performer)
+        if pose is None or state is None or tracks is None or performer not in tracks.extensions:
+            return None
+        store, motion = tracks.extensions[performer], tracks.performers[performer]
+        values = store.values_at(timeline.position_at(state, reference), state.loop, state.duration)
+        if values is None or motion is None:
+            return None
+        figure = motion.track.figure
+        placed = world_transforms(figure, pose[0][None], pose[1][None])
+        return extend_pose(figure, store.track.extension, *placed, values[None])
+
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:
         """Return the seven values (7,) of the camera or light `scenes[scene]` at `reference`, or None
         (proto/codec.md, 2.14)."""
@@ -193,7 +214,7 @@ class Viewer:
         if state is None or self._tracks is None or state.motion != self.motion or not 0 <= scene < len(self.scenes):
             return None
         store = self._tracks.scenes[scene]
-        return store.scene_at(timeline.position_at(state, reference), state.loop, state.duration)
+        return store.values_at(timeline.position_at(state, reference), state.loop, state.duration)
 
     def camera_at(self, reference: int) -> Array | None:
         """Return `scene_at` of the motion's camera: the first one."""
@@ -298,6 +319,8 @@ class Viewer:
                 self.statistics.camera_blocks += 1
             else:
                 self.statistics.light_blocks += 1
+        elif isinstance(store, ExtensionBlockStore):
+            store.put(data.index, data.rate, decode_extension_block(store.track, data.block))
         elif isinstance(store, AudioBlockStore):
             store.put_encoded(data.index, data.rate, data.block)
             self.statistics.audio_blocks += 1

@@ -13,6 +13,8 @@ from typing import Any, NamedTuple, Protocol
 import msgpack
 
 from bunraku.codec.audio import AudioTrack, EncodedAudio, parse_audio_track
+from bunraku.codec.extension_encoder import EncodedExtension
+from bunraku.codec.extension_track import EXTENSION_TYPE, ExtensionTrack, parse_extension_track
 from bunraku.codec.motion_encoder import EncodedMotion
 from bunraku.codec.motion_track import MotionTrack, parse_motion_track
 from bunraku.codec.scene import SceneTrack, parse_scene_track
@@ -24,7 +26,7 @@ from bunraku.wire.messages import Data, Description
 MAX_TRACKS = 16
 """Limit of the tracks of a motion: a Data message has four bits for the track."""
 
-Track = MotionTrack | SceneTrack | AudioTrack
+Track = MotionTrack | SceneTrack | AudioTrack | ExtensionTrack
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,7 @@ class PerformerTracks:
 class StoredMotion:
     """A motion as it is sent.
 
-    `description` is its Description message. `tracks` has the tracks, those of the performers first,
+    `description` is its Description message. `tracks` has the tracks, those of the performers first, extensions last,
     `packets[track][level][index]` their Data messages, and `bitrates_kbps[track][level]` their bitrates, lowest level
     first.
     """
@@ -79,6 +81,13 @@ class _Level(Protocol):
     def blocks(self) -> list[bytes]: ...
 
 
+class _EncodedTrack(Protocol):
+    @property
+    def ladder(self) -> Sequence[_Level]: ...
+
+    def describe(self) -> dict[str, Any]: ...
+
+
 class _ObjectTrack(NamedTuple):
     """A track on its way into an object: its entry in the Description, and its blocks by level and index."""
 
@@ -87,20 +96,24 @@ class _ObjectTrack(NamedTuple):
 
     @property
     def type(self) -> str:
-        """Type of the track: `motion`, `camera`, `light` or `audio`."""
+        """Type of the track: `motion`, `camera`, `light`, `audio` or `extension`."""
         track_type: str = self.description["type"]
         return track_type
 
 
 def pack_motion(
-    motion_id: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = (), others: Sequence[EncodedMotion] = ()
+    motion_id: str,
+    encoded: EncodedMotion,
+    scenes: Sequence[EncodedScene] = (),
+    others: Sequence[EncodedMotion] = (),
+    extensions: Sequence[EncodedExtension] = (),
 ) -> bytes:
-    """Return the object of a motion: its performers (`encoded`, then `others`), then its cameras and lights.
+    """Return the object of a motion: performers (`encoded`, then `others`), cameras and lights, then extensions.
 
     Raises ValueError for more than MAX_TRACKS tracks.
     """
-    motions = [_new_track(motion.describe(), motion.ladder) for motion in (encoded, *others)]
-    return _pack_object(motion_id, [*motions, *(_new_track(scene.describe(), scene.ladder) for scene in scenes)])[0]
+    tracks: list[_EncodedTrack] = [encoded, *others, *scenes, *extensions]
+    return _pack_object(motion_id, [_new_track(track.describe(), track.ladder) for track in tracks])[0]
 
 
 def add_audio_track(motion_id: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[bytes, list[str]]:
@@ -159,7 +172,8 @@ def add_performers(
         track._replace(description=track.description | {"place": list(placement)})
         for track, placement in zip(performers, placements, strict=True)
     ]
-    return _pack_object(motion_id, [*placed, *(track for track in own if track.type != "motion")])
+    staging = [track for track in own if track.type not in ("motion", EXTENSION_TYPE)]
+    return _pack_object(motion_id, [*placed, *staging, *_joined_extensions([stored, *others])])
 
 
 def unpack_motion(motion_id: str, packed: bytes) -> StoredMotion:
@@ -179,12 +193,7 @@ def unpack_motion(motion_id: str, packed: bytes) -> StoredMotion:
         if description["type"] == "motion"
     )
     first_track = performers[0].track
-    other_tracks = (
-        parse_audio_track(description, first_track)
-        if description["type"] == "audio"
-        else parse_scene_track(description)
-        for description in descriptions[len(performers) :]
-    )
+    other_tracks = (_parse_other_track(description, first_track) for description in descriptions[len(performers) :])
     return StoredMotion(
         motion_id,
         values["description"],
@@ -195,8 +204,36 @@ def unpack_motion(motion_id: str, packed: bytes) -> StoredMotion:
     )
 
 
+def _parse_other_track(description: dict[str, Any], first_track: MotionTrack) -> Track:
+    """Return a track that is no performer's motion. Raises `DamagedBlock`."""
+    if description["type"] == "audio":
+        return parse_audio_track(description, first_track)
+    if description["type"] == EXTENSION_TYPE:
+        return parse_extension_track(description)
+    return parse_scene_track(description)
+
+
+def _joined_extensions(motions: Sequence[StoredMotion]) -> list[_ObjectTrack]:
+    """Return the extensions of all performers of `motions`, which are counted through."""
+    found, performer_count = [], 0
+    for motion in motions:
+        for track in _stored_tracks(motion):
+            if track.type == EXTENSION_TYPE:
+                performer = performer_count + track.description["performer"]
+                found.append(track._replace(description=track.description | {"performer": performer}))
+        performer_count += len(motion.performers)
+    return found
+
+
 def _pack_object(motion_id: str, tracks: Sequence[_ObjectTrack]) -> tuple[bytes, list[str]]:
-    """Return an object and the types of its tracks. Raises ValueError for more than MAX_TRACKS tracks."""
+    """Return an object and the types of its tracks. Raises ValueError for more than MAX_TRACKS tracks.
+
+    Extensions come last, as a stream without them describes only the tracks before; those without a number are left
+    out.
+    """
+    required = [track for track in tracks if track.type != EXTENSION_TYPE]
+    extensions = [track for track in tracks if track.type == EXTENSION_TYPE]
+    tracks = [*required, *extensions[: max(MAX_TRACKS - len(required), 0)]]
     if len(tracks) > MAX_TRACKS:
         raise ValueError(f"A motion has at most {MAX_TRACKS} tracks, this would have {len(tracks)}.")
     packets = [

@@ -9,6 +9,7 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.extension_fit import ExtensionMotion, extended_pose, fit_body_extension
 from bunraku.motion.fit import FigureFit
 from bunraku.motion.joint_tree import common_ancestor
 from bunraku.motion.limb_fit import fit_arm, fit_leg
@@ -53,7 +54,8 @@ class Analysis:
     `motion` has the source's frame rate; `profile` is the naming convention ("shape": none matched); `source_joints`
     maps H-Anim joints to source joints; `rest_pose` is "T", "A", "I", "bone-aligned" or "other"; `unit` the unit of
     length; `assumptions` are sentences for the uploader. Fit errors are distances between the figure's joints and the
-    source's, over all mapped joints and frames, in millimetres; `joint_fits` has each joint's.
+    source's, over all mapped joints and frames, in millimetres; `joint_fits` has each joint's. `extension` has the
+    source's spine, neck and clavicles, if it has such joints; with them, the errors are the `extended` ones.
     """
 
     motion: Motion
@@ -65,6 +67,9 @@ class Analysis:
     mean_fit_error_mm: float
     max_fit_error_mm: float
     joint_fits: dict[str, JointFit]
+    extension: ExtensionMotion | None
+    extended_mean_error_mm: float
+    extended_max_error_mm: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +103,8 @@ def analyse(source: SourceMotion) -> Analysis:
     """
     fitted = fit_source(source)
     fit = fitted.fit
-    motion = Motion(fitted.build_figure(), source.fps, fit.joint_positions[:, 0].copy(), fit.local_rotations())
+    figure = fitted.build_figure()
+    motion = Motion(figure, source.fps, fit.joint_positions[:, 0].copy(), fit.local_rotations())
     placed, _ = world_transforms(motion.figure, motion.root, motion.rotations)
     mapped = sorted(fit.joints)
     apart = 1000.0 * np.linalg.norm(placed[:, mapped] - fit.position[:, [fit.joints[j] for j in mapped]], axis=-1)
@@ -107,6 +113,8 @@ def analyse(source: SourceMotion) -> Analysis:
             f"The fit is poor: the figure's joints are {apart.mean():.0f} mm from the source's on average. "
             "The source may not have the body of a human."
         )
+    extension = fit_body_extension(fit)
+    extended = apart if extension is None else _measure_extended(fit, figure, extension)
     return Analysis(
         motion=motion,
         profile=fitted.profile,
@@ -120,7 +128,20 @@ def analyse(source: SourceMotion) -> Analysis:
             JOINTS[joint]: JointFit(fit.joints[joint], mean)
             for joint, mean in zip(mapped, apart.mean(axis=0).tolist(), strict=True)
         },
+        extension=extension,
+        extended_mean_error_mm=float(extended.mean()),
+        extended_max_error_mm=float(extended.max()),
     )
+
+
+def _measure_extended(fit: FigureFit, figure: Figure, extension: ExtensionMotion) -> Array:
+    """Return the distances (n, m) of the extended figure's joints from the source's, millimetres."""
+    pose = extended_pose(fit, figure, extension)
+    mapped = [joint for joint in sorted(fit.joints) if JOINTS[joint] != "vl5" or not extension.extension.spine_count]
+    placed = np.concatenate([pose.positions[:, mapped], pose.extra_positions], axis=1)
+    sources = [*(fit.joints[joint] for joint in mapped), *extension.sources]
+    apart: Array = 1000.0 * np.linalg.norm(placed - fit.position[:, sources], axis=-1)
+    return apart
 
 
 def fit_source(source: SourceMotion) -> SourceFit:

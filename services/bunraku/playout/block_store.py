@@ -6,6 +6,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
+from bunraku.codec.extension_track import ExtensionBlock, ExtensionTrack
 from bunraku.codec.motion_decoder import MotionBlock
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneTrack
@@ -137,14 +138,22 @@ def _interpolate_rotations(block: MotionBlock, following: MotionBlock | None, in
     return rotation.slerp(last, first, np.repeat(mix[:, None], len(last), axis=1))
 
 
-class SceneBlockStore(TrackBlockStore[SceneTrack, SceneBlock]):
-    """Decoded blocks of one camera or light, each at the highest level received."""
+class _ValuesBlock(_Block, Protocol):
+    def values_at(self, instants: Array | float) -> Array:
+        """Return the values (m, ...) at `instants` (m,), in frames from the block's first."""
 
-    def scene_at(self, position: int, loop: bool, duration: int) -> Array | None:
-        """Return the values (7,) at `position` of a motion of `duration` microseconds, None if the block is missing.
 
-        They are interpolated linearly between blocks, and at the end of a loop if the track is as long as the motion.
-        Past the end of a shorter track they stay constant.
+ValuesBlock = TypeVar("ValuesBlock", bound=_ValuesBlock)
+
+
+class ValuesBlockStore(TrackBlockStore[Track, ValuesBlock]):
+    """Decoded blocks of a track of values that are interpolated linearly, each at the highest level received."""
+
+    def values_at(self, position: int, loop: bool, duration: int) -> Array | None:
+        """Return the values at `position` of a motion of `duration` microseconds, None if the block is missing.
+
+        They are interpolated between blocks, and at the end of a loop if the track is as long as the motion. Past the
+        end of a shorter track they stay constant.
         """
         found = self._find_block(position, loop, duration)
         if found is None:
@@ -156,3 +165,11 @@ class SceneBlockStore(TrackBlockStore[SceneTrack, SceneBlock]):
         last, first = block.values_at(block.frames - 1.0)[0], following.values_at(0.0)[0]
         mixed: Array = last + min(instant - (block.frames - 1), 1.0) * (first - last)
         return mixed
+
+
+class SceneBlockStore(ValuesBlockStore[SceneTrack, SceneBlock]):
+    """Decoded blocks of one camera or light: seven values."""
+
+
+class ExtensionBlockStore(ValuesBlockStore[ExtensionTrack, ExtensionBlock]):
+    """Decoded blocks of one extension: values (E, 3) of its joints."""

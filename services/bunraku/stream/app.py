@@ -23,7 +23,7 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.stream import metrics
 from bunraku.stream.context import StreamContext
 from bunraku.stream.flow_control import Link
-from bunraku.stream.track_selection import TRACK_TYPES, ViewerOptions
+from bunraku.stream.track_selection import DEFAULT_TRACK_TYPES, TRACK_TYPES, ViewerOptions
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket import subprotocol
@@ -218,4 +218,4 @@ def _parse_track_types(tracks: str) -> tuple[str, ...]:
             "Unknown track",
             f"{unknown[0]!r} is not a type of track; use {', '.join(TRACK_TYPES)}",
         )
-    return selected or TRACK_TYPES
+    return selected or DEFAULT_TRACK_TYPES

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.container import StoredMotion, Track
+from bunraku.codec.extension_track import EXTENSION_TYPE, ExtensionTrack
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SCENE_CHANNEL_COUNT, SceneTrack
 from bunraku.delivery import allocation
@@ -15,7 +16,9 @@ from bunraku.delivery.resume import ResumeState
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.wire.messages import Description, unpack
 
-TRACK_TYPES = ("motion", "audio", "camera", "light")
+DEFAULT_TRACK_TYPES = ("motion", "audio", "camera", "light")
+"""Types of tracks that a viewer is sent who requests none."""
+TRACK_TYPES = (*DEFAULT_TRACK_TYPES, EXTENSION_TYPE)
 """Types of tracks that a viewer may request."""
 
 
@@ -25,7 +28,7 @@ class ViewerOptions:
 
     pinned_level: int | None = None
     """Bitrate level of the motion to keep to; None to adapt it."""
-    track_types: tuple[str, ...] = TRACK_TYPES
+    track_types: tuple[str, ...] = DEFAULT_TRACK_TYPES
     """Types of the tracks whose blocks are sent."""
     has_own_timeline: bool = False
     """True for a viewer of a stored motion, who may edit the timeline."""
@@ -88,6 +91,8 @@ def motion_bitrates(motion: StoredMotion) -> list[float]:
 def _count_track_channels(track: Track) -> int:
     if isinstance(track, AudioTrack):
         return track.channels
+    if isinstance(track, ExtensionTrack):
+        return len(track.layout.axes)
     return SCENE_CHANNEL_COUNT if isinstance(track, SceneTrack) else CHANNEL_COUNT
 
 

@@ -149,7 +149,7 @@ def test_camera_keyframes_become_a_track() -> None:
         held.put(index, 4, decode_scene_block(track, Data.unpack(packet).block))
     for frame, mix in ((0, 0.0), (30, 0.0), (45, 0.5), (60, 1.0), (89, 1.0)):
         expected = (1 - mix) * np.array(keys[0][1:]) + mix * np.array(keys[1][1:])
-        values = held.scene_at(round(frame * 1e6 / 60), False, motion.first_track.duration_us)
+        values = held.values_at(round(frame * 1e6 / 60), False, motion.first_track.duration_us)
         assert values is not None
         np.testing.assert_allclose(values, expected, atol=2e-3)
 

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from bunraku.codec import motion_encoder
 from bunraku.codec.container import pack_motion
+from bunraku.codec.extension_encoder import encode_extension
+from bunraku.codec.extension_track import EXTENSION_TYPE
 from bunraku.ingest.jobs.encoding import describe_encoding, encode_motions
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
-from bunraku.motion.analysis import analyse
+from bunraku.motion.analysis import Analysis, analyse
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.extension_fit import ExtensionMotion
 from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.readers.motion_file import read_motion
 
@@ -37,8 +41,10 @@ def encode_file(
         return JobRejection("No puppet's arms", detail, field=error.field, hint=error.hint)
     on_progress(0.0)
     (encoded,) = encode_motions([analysis.motion], on_progress)
+    extension = analysis.extension
+    extensions = [] if extension is None else [encode_extension(extension.extension, extension.values, encoded.track)]
     return JobResult(
-        pack_motion(motion_id, encoded),
+        pack_motion(motion_id, encoded, extensions=extensions),
         {
             **describe_encoding(analysis.motion, encoded),
             "profile": analysis.profile,
@@ -47,5 +53,20 @@ def encode_file(
             "unit": analysis.unit,
             "guessed": analysis.assumptions,
             "fit": {"mean_mm": round(analysis.mean_fit_error_mm, 3), "max_mm": round(analysis.max_fit_error_mm, 3)},
+            **({} if extension is None else _describe_extension(analysis, extension)),
         },
     )
+
+
+def _describe_extension(analysis: Analysis, extension: ExtensionMotion) -> dict[str, Any]:
+    """Return what an extension adds to a motion's description."""
+    return {
+        "tracks": ["motion", EXTENSION_TYPE],
+        "extension": {
+            "joints": list(extension.extension.names),
+            "fit": {
+                "mean_mm": round(analysis.extended_mean_error_mm, 3),
+                "max_mm": round(analysis.extended_max_error_mm, 3),
+            },
+        },
+    }
