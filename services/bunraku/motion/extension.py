@@ -36,7 +36,7 @@ DRIVE_UNIT = 2.0**-6
 REST_UNIT_RAD = 2.0**-12
 """Units of the integers that describe an extension."""
 
-_ROOT, _CHEST, _HEAD = 0, JOINT_INDEX["vl5"], JOINT_INDEX["skullbase"]
+_ROOT, _VL5, _HEAD = 0, JOINT_INDEX["vl5"], JOINT_INDEX["skullbase"]
 _SHOULDERS = JOINT_INDEX["l_shoulder"], JOINT_INDEX["r_shoulder"]
 _TINY_M = 1e-9
 """Length below which a bone has no direction."""
@@ -55,11 +55,12 @@ class JointKind(Enum):
 class BodyExtension:
     """Joints of an extension, E in all: those of the spine upwards, then the neck, then both clavicles.
 
-    `offsets` (E, 3) are their positions from their parents, in metres at rest; the parent of the neck and the clavicles
-    is the last joint of the spine, or vl5. `ends` (3, 3) are the positions of skullbase, left and right shoulder from
-    the neck and the clavicles, or from the last joint of the spine where these are missing. The rotation of a joint is
-    exp(`drive` f + `rest` + v): `drive` (E, 3, 3) applies to the driver f, `rest` (E, 3) is in radians, and v is the
-    joint's value.
+    The chest is the last joint of the spine, or the root. It is the parent of neck and clavicles. `offsets` (E, 3) are
+    the joints' positions from their parents, in metres at rest; `ends` (3, 3) those of skullbase, left and right
+    shoulder from the neck and the clavicles, or from the chest where these are missing.
+
+    The rotation of a joint is exp(`drive` f + `rest` + v), of the spine in the root's frame, of others in the chest's:
+    `drive` (E, 3, 3) applies to the driver f, `rest` (E, 3) is in radians, and v is the joint's value.
     """
 
     spine_count: int
@@ -111,12 +112,12 @@ def find_driver(kind: JointKind, positions: Array, orientations: Array, chest: A
         clavicle, the direction of the upper arm in vl5.
     """
     if kind is JointKind.SPINE:
-        return _relative_rotation(orientations[:, _ROOT], orientations[:, _CHEST])
+        return _relative_rotation(orientations[:, _ROOT], orientations[:, _VL5])
     if kind is JointKind.NECK:
         return _relative_rotation(chest, orientations[:, _HEAD])
     shoulder = _SHOULDERS[kind is JointKind.RIGHT_CLAVICLE]
     upper_arm = _direction(positions[:, shoulder + 1] - positions[:, shoulder])
-    return rotation.rotate(rotation.conjugate(orientations[:, _CHEST]), upper_arm)
+    return rotation.rotate(rotation.conjugate(orientations[:, _VL5]), upper_arm)
 
 
 def extend_pose(
@@ -137,8 +138,7 @@ def extend_pose(
         np.empty((len(positions), len(extension.offsets), 3)),
         np.empty((len(positions), len(extension.offsets), 4)),
     )
-    start, frame = (positions[:, _ROOT], orientations[:, _ROOT]) if extension.spine_count else _chest(extended)
-    chest = start, frame
+    start, frame = chest = positions[:, _ROOT], orientations[:, _ROOT]
     ends = dict.fromkeys((_HEAD, *_SHOULDERS), chest)
     for index, kind in enumerate(extension.kinds):
         if kind is not JointKind.SPINE:
@@ -160,10 +160,6 @@ def extend_pose(
     for shoulder in _SHOULDERS:
         _extend_arm(figure, extended, positions, shoulder)
     return extended
-
-
-def _chest(pose: ExtendedPose) -> tuple[Array, Array]:
-    return pose.positions[:, _CHEST], pose.orientations[:, _CHEST]
 
 
 def _extend_arm(figure: Figure, extended: ExtendedPose, positions: Array, shoulder: int) -> None:

@@ -97,9 +97,6 @@ class _ExtensionFit:
         self._fit = fit
         self._sources = sources
         self._start, self._frame = fit.joint_positions[:, 0], fit.joint_orientations[:, 0]
-        if not any(kind is JointKind.SPINE for kind, _ in sources):
-            vl5 = JOINT_INDEX["vl5"]
-            self._start, self._frame = fit.joint_positions[:, vl5], fit.joint_orientations[:, vl5]
         self._chest = self._start, self._frame
         self._ends = dict.fromkeys((_HEAD, *_SHOULDERS), self._chest)
 
@@ -107,8 +104,8 @@ class _ExtensionFit:
         """Place all joints; return the extension with constants as they are described, and its values."""
         kinds = [kind for kind, _ in self._sources]
         offsets, drives, rests, values = [], [], [], []
-        for kind, source in self._sources:
-            offset, orientation = self._place_joint(kind, source)
+        for index, (kind, source) in enumerate(self._sources):
+            offset, orientation = self._place_joint(kind, source, self._find_target(index))
             parent = self._fit.joint_orientations[:, 0] if kind is JointKind.SPINE else self._chest[1]
             driver = find_driver(
                 kind, self._fit.joint_positions, self._fit.joint_orientations, self._chest_before(kind, orientation)
@@ -136,21 +133,33 @@ class _ExtensionFit:
         """Return the chest's orientation that the driver of a joint is relative to."""
         return orientation if kind is JointKind.SPINE else self._chest[1]
 
-    def _place_joint(self, kind: JointKind, source: int) -> tuple[Array, Array]:
-        """Place the joint that follows `source`; return its offset (3,) and its world orientation (n, 4)."""
+    def _find_target(self, index: int) -> int | None:
+        """Return the source joint at which a joint aims; None for the chest."""
+        kind = self._sources[index][0]
+        if kind is JointKind.SPINE:
+            following = self._sources[index + 1 : index + 2]
+            return following[0][1] if following and following[0][0] is JointKind.SPINE else None
+        end = _HEAD if kind is JointKind.NECK else _SHOULDERS[kind is JointKind.RIGHT_CLAVICLE]
+        return self._fit.joints[end]
+
+    def _place_joint(self, kind: JointKind, source: int, target: int | None) -> tuple[Array, Array]:
+        """Place the joint that follows `source`; return its offset (3,) and its world orientation (n, 4).
+
+        It aims at `target`, as the source may have further joints up to there.
+        """
         fit = self._fit
         start, frame = (self._start, self._frame) if kind is JointKind.SPINE else self._chest
         offset = _round_lengths(mean_local_positions(frame, fit.position[:, [source]] - start[:, None])[0])
         place, orientation = start + rotation.rotate(frame, offset), fit.turn[:, source]
+        if target is not None:
+            aimed = fit.position[:, target]
+            arm = mean_local_positions(orientation, aimed[:, None] - place[:, None])[0]
+            orientation = aim_at(orientation, arm, place, aimed)
         if kind is JointKind.SPINE:
             self._start, self._frame = self._chest = place, orientation
             self._ends = dict.fromkeys(self._ends, self._chest)
         else:
             end = _HEAD if kind is JointKind.NECK else _SHOULDERS[kind is JointKind.RIGHT_CLAVICLE]
-            target = fit.position[:, fit.joints[end]]
-            arm = mean_local_positions(orientation, target[:, None] - place[:, None])[0]
-            # a source may have further joints up to there
-            orientation = aim_at(orientation, arm, place, target)
             self._ends[end] = place, orientation
         return offset, orientation
 
