@@ -13,6 +13,7 @@ from tests.vectors import (
     audio,
     blocks,
     controlled_limb,
+    extension,
     live,
     messages,
     one_euro,
@@ -37,6 +38,7 @@ GENERATORS: dict[str, Callable[[], Any]] = {
     "playback.json": playback.make_vectors,
     "pulled.json": controlled_limb.make_vectors,
     "scene.json": scene.make_vectors,
+    "extension.json": extension.make_vectors,
     "skeletons.json": skeletons.make_vectors,
     "trace.json": trace.make_vectors,
 }

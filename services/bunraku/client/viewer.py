@@ -133,15 +133,16 @@ class Viewer:
     def _make_url(self) -> str:
         """Return the URL to connect to: after the first connection with the blocks already received and the
         position."""
+        query = {"extensions": "true"}
         state = self.timeline_history.newest
-        if state is None or self._tracks is None or self.motion is None:
-            return self.url
-        now = self.clock.at(self._local_clock())
-        position = timeline.position_at(state, now)
-        (first, rates), *others = (_held_blocks(store, position) for store in self._tracks.performers)
-        query = {"have": ResumeState(self.motion, first, rates, self._tracks.described_count, others).to_query()}
-        if "/sessions/" not in self.url:
-            query |= {"at": f"{position / 1e6:.6f}", "clock": str(now)}
+        if state is not None and self._tracks is not None and self.motion is not None:
+            now = self.clock.at(self._local_clock())
+            position = timeline.position_at(state, now)
+            (first, rates), *others = (_held_blocks(store, position) for store in self._tracks.performers)
+            resumed = ResumeState(self.motion, first, rates, self._tracks.described_count, others)
+            query["have"] = resumed.to_query()
+            if "/sessions/" not in self.url:
+                query |= {"at": f"{position / 1e6:.6f}", "clock": str(now)}
         parts = urlsplit(self.url)
         kept = [(key, value) for key, value in parse_qsl(parts.query) if key not in query]
         return parts._replace(query=urlencode([*kept, *query.items()])).geturl()
@@ -192,8 +193,7 @@ class Viewer:
     def extended_pose_at(self, reference: int, performer: int = 0) -> ExtendedPose | None:
         """Return the world positions and orientations of all joints of a performer, of the extension too.
 
-        None if the stream has no extension of the performer (`tracks=` in its URL asks for them), or a block is
-        missing. The arrays have one instant.
+        None if the motion has no extension of the performer, or a block is missing. The arrays have one instant.
         """
         state, tracks = self.timeline_history.at(reference), self._tracks
         pose = self.pose_at(reference, performer)

@@ -11,6 +11,7 @@ from starlette.websockets import WebSocketDisconnect
 
 from bunraku.codec.container import StoredMotion
 from bunraku.delivery.resume import ResumeState
+from bunraku.codec.extension_track import EXTENSION_TYPE
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.problem_details import motion_not_found
@@ -23,7 +24,7 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.stream import metrics
 from bunraku.stream.context import StreamContext
 from bunraku.stream.flow_control import Link
-from bunraku.stream.track_selection import DEFAULT_TRACK_TYPES, TRACK_TYPES, ViewerOptions
+from bunraku.stream.track_selection import TRACK_TYPES, ViewerOptions
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket import subprotocol
@@ -36,6 +37,7 @@ IMMUTABLE_HEADERS = {"Cache-Control": "public, max-age=31536000, immutable"}
 
 LevelQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
+ExtensionsQuery = Annotated[bool, Query()]
 ResumeQuery = Annotated[str, Query(max_length=400)]
 MAX_RESUME_AGE_US = 60_000_000
 """A viewer may date the start of its timeline back or ahead by at most this, microseconds."""
@@ -94,13 +96,14 @@ def create_app(context: ServiceContext) -> FastAPI:
         motion: str,
         rate: LevelQuery = None,
         tracks: TracksQuery = "",
+        extensions: ExtensionsQuery = False,
         have: ResumeQuery = "",
         at: float = 0.0,
         clock_at: Annotated[int | None, Query(alias="clock")] = None,
     ) -> None:
         try:
             options = ViewerOptions(
-                rate, _parse_track_types(tracks), has_own_timeline=True, resume_state=_parse_resume_state(have)
+                rate, _parse_track_types(tracks, extensions), has_own_timeline=True, resume_state=_parse_resume_state(have)
             )
             viewer = ViewerConnection(stream, options)
             found = await context.motion_store.get(motion)
@@ -127,10 +130,17 @@ def create_app(context: ServiceContext) -> FastAPI:
     @app.websocket("/v1/sessions/{session}/stream")
     @requires(Role.VIEW)
     async def watch_session(
-        socket: WebSocket, session: str, rate: LevelQuery = None, tracks: TracksQuery = "", have: ResumeQuery = ""
+        socket: WebSocket,
+        session: str,
+        rate: LevelQuery = None,
+        tracks: TracksQuery = "",
+        extensions: ExtensionsQuery = False,
+        have: ResumeQuery = "",
     ) -> None:
         try:
-            options = ViewerOptions(rate, _parse_track_types(tracks), resume_state=_parse_resume_state(have))
+            options = ViewerOptions(
+                rate, _parse_track_types(tracks, extensions), resume_state=_parse_resume_state(have)
+            )
             viewer = ViewerConnection(stream, options)
             try:
                 async with sessions.open(session) as watched:
@@ -208,8 +218,11 @@ def _parse_resume_state(have: str) -> ResumeState | None:
         raise CloseConnection(subprotocol.POLICY_VIOLATION, "Unreadable query", str(error)) from None
 
 
-def _parse_track_types(tracks: str) -> tuple[str, ...]:
-    """Parse the `tracks` parameter; all types if it is empty. Raise `CloseConnection` for an unknown type."""
+def _parse_track_types(tracks: str, extensions: bool) -> tuple[str, ...]:
+    """Parse the `tracks` parameter; all types if it is empty. Extensions are sent if they are asked for.
+
+    Raise `CloseConnection` for an unknown type.
+    """
     selected = tuple(name for name in tracks.split(",") if name)
     unknown = [name for name in selected if name not in TRACK_TYPES]
     if unknown:
@@ -218,4 +231,4 @@ def _parse_track_types(tracks: str) -> tuple[str, ...]:
             "Unknown track",
             f"{unknown[0]!r} is not a type of track; use {', '.join(TRACK_TYPES)}",
         )
-    return selected or DEFAULT_TRACK_TYPES
+    return (selected or TRACK_TYPES) + ((EXTENSION_TYPE,) if extensions else ())

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.container import StoredMotion, Track
-from bunraku.codec.extension_track import EXTENSION_TYPE, ExtensionTrack
+from bunraku.codec.extension_track import ExtensionTrack
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SCENE_CHANNEL_COUNT, SceneTrack
 from bunraku.delivery import allocation
@@ -16,10 +16,8 @@ from bunraku.delivery.resume import ResumeState
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.wire.messages import Description, unpack
 
-DEFAULT_TRACK_TYPES = ("motion", "audio", "camera", "light")
-"""Types of tracks that a viewer is sent who requests none."""
-TRACK_TYPES = (*DEFAULT_TRACK_TYPES, EXTENSION_TYPE)
-"""Types of tracks that a viewer may request."""
+TRACK_TYPES = ("motion", "audio", "camera", "light")
+"""Types of tracks that a viewer may request by name, and is sent by default. Extensions have a parameter of their own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +26,7 @@ class ViewerOptions:
 
     pinned_level: int | None = None
     """Bitrate level of the motion to keep to; None to adapt it."""
-    track_types: tuple[str, ...] = DEFAULT_TRACK_TYPES
+    track_types: tuple[str, ...] = TRACK_TYPES
     """Types of the tracks whose blocks are sent."""
     has_own_timeline: bool = False
     """True for a viewer of a stored motion, who may edit the timeline."""

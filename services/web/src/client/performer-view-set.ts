@@ -1,17 +1,21 @@
 /** Performers of the current motion, and the playback statistics of the first one. */
 
-import type { Figure, Pose } from "../motion/skeleton";
+import type { StagedPose } from "../motion/extension";
+import type { Figure } from "../motion/skeleton";
+import type { ExtensionPoses } from "../playout/extension-poses";
 import type { LivePoses } from "../playout/live-poses";
 import { OverlayBuffer } from "../playout/overlay-buffer";
 import { positionAt } from "../playout/timeline";
 import type { TrackSet } from "../playout/track-set";
 import type { Live } from "../wire/live";
-import type { TimelineState } from "../wire/messages";
+import type { Data, TimelineState } from "../wire/messages";
 import { type LimbPredictor, PerformerView } from "./performer-view";
 import type { SolverLoader } from "./solver-loader";
 
 /** Time after which loading the decoder of live poses is attempted again, milliseconds. */
 const LIVE_RETRY_DELAY_MS = 2_000;
+/** Blocks of extensions that are kept until their code is loaded. */
+const MAX_EARLY_BLOCKS = 256;
 
 /** "starting": no pose yet. "stalled": a block is missing, and the last pose is shown. */
 export type PlaybackState = "starting" | "stalled" | "playing";
@@ -33,6 +37,12 @@ export class PerformerViewSet {
   /** Live poses, null until a live performer needed their decoder. */
   live: LivePoses | null = null;
   private isLoadingLive = false;
+  /** Extensions of the performers, null until their code is loaded. */
+  private extensions: ExtensionPoses | null = null;
+  private isLoadingExtensions = false;
+  /** Blocks of extensions that arrived before their code. */
+  private earlyBlocks: Data[] = [];
+  private tracks: TrackSet | null = null;
   private stores: TrackSet["performers"] = [];
 
   /** @param createLoader function that creates the solver loader of a figure */
@@ -51,15 +61,27 @@ export class PerformerViewSet {
     this.all = [];
     this.stores = tracks.performers;
     this.live?.reset(this.stores);
+    this.tracks = tracks;
+    this.extensions = null;
+    this.earlyBlocks = [];
     this.add(tracks);
   }
 
   /** Add the performers that were described since the last call. */
-  add({ performers }: TrackSet): void {
+  add({ performers, extensions }: TrackSet): void {
     for (let number = this.all.length; number < performers.length; number++) {
       const store = performers[number];
       this.all.push(store && new PerformerView(number, store, this.createLoader(store.track.figure)));
     }
+    if (this.extensions) this.extensions.add(extensions);
+    else if (extensions.size > 0) void this.loadExtensions();
+  }
+
+  /** Store a block of an extension; return false if it is damaged. */
+  putExtension(block: Data): boolean {
+    if (this.extensions) return this.extensions.put(block);
+    if (this.earlyBlocks.length < MAX_EARLY_BLOCKS) this.earlyBlocks.push(block);
+    return true;
   }
 
   /** Load the missing solvers of the performers shown so far. */
@@ -78,13 +100,14 @@ export class PerformerViewSet {
   }
 
   /** Return the pose of a performer at presented clock time `clock`, local time `nowMs`: see `Viewer.poseAt`. */
-  poseAt(performer: number, timeline: TimelineState, clock: number, nowMs: number): Pose | null {
+  poseAt(performer: number, timeline: TimelineState, clock: number, nowMs: number): StagedPose | null {
     const view = this.all[performer];
     if (!view) return null;
-    if (this.live && view.seekLive(this.live, clock)) {
+    const position = positionAt(timeline, clock);
+    const isLive = this.live !== null && view.seekLive(this.live, clock);
+    if (isLive) {
       if (performer === 0) this.onPoseShown(nowMs);
     } else {
-      const position = positionAt(timeline, clock);
       const hasBlock = view.seek(position, timeline.loop, timeline.duration);
       if (performer === 0) {
         const index = view.store.track.blockAt(position);
@@ -92,7 +115,26 @@ export class PerformerViewSet {
         else if (timeline.playing && view.hasPose) this.onBlockMissing(index);
       }
     }
-    return view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
+    const pose: StagedPose | null = view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
+    const extension = isLive ? null : this.extensions?.performer(performer);
+    if (pose) pose.extended = extension?.extend(view.figure, pose, position, timeline.loop, timeline.duration) ?? null;
+    return pose;
+  }
+
+  private async loadExtensions(): Promise<void> {
+    if (this.isLoadingExtensions) return;
+    this.isLoadingExtensions = true;
+    try {
+      const { ExtensionPoses } = await import("../playout/extension-poses");
+      if (!this.tracks) return;
+      this.extensions = new ExtensionPoses();
+      this.extensions.add(this.tracks.extensions);
+      for (const block of this.earlyBlocks.splice(0)) this.extensions.put(block);
+    } catch {
+      // the figures move without; the next motion tries again
+    } finally {
+      this.isLoadingExtensions = false;
+    }
   }
 
   private async loadLive(): Promise<void> {

@@ -3,8 +3,9 @@
 import { DamagedBlock } from "../codec/errors";
 import type { SceneTrack } from "../codec/scene";
 import type { BitrateLevel } from "../codec/timing";
+import type { StagedPose } from "../motion/extension";
 import type { StagedPerformer } from "../motion/placement";
-import type { Figure, Pose } from "../motion/skeleton";
+import type { Figure } from "../motion/skeleton";
 import type { AudioBlockStore } from "../playout/audio-store";
 import type { MotionBlockStore } from "../playout/block-store";
 import { ReferenceClock } from "../playout/clock";
@@ -67,6 +68,7 @@ export class Viewer extends EventTarget {
   constructor(options: ViewerOptions) {
     super();
     this.url = new URL(options.url);
+    this.url.searchParams.set("extensions", "true");
     this.now = options.now ?? (() => performance.now());
     const { access = pageAccess, solver = marionetteSolverFactory(access) } = options;
     const origin = this.url.origin.replace(/^ws/, "http");
@@ -182,7 +184,7 @@ export class Viewer extends EventTarget {
    * controlled limbs, and the predictions of this page's own. Null before the first pose; while a block is missing the
    * last pose is kept. The next call for this performer reuses the storage.
    */
-  poseAt(nowMs: number, performer = 0): Pose | null {
+  poseAt(nowMs: number, performer = 0): StagedPose | null {
     const clock = this.presentationTime(nowMs);
     const timeline = this.timelineHistory.at(clock);
     if (!timeline || timeline.motion !== this.motion) return null;
@@ -356,6 +358,10 @@ export class Viewer extends EventTarget {
   }
 
   private storeBlock(message: Data, now: number): void {
+    if (this.tracks?.extensions.has(message.track)) {
+      if (!this.performerViews.putExtension(message)) this.collector.damagedCount++;
+      return;
+    }
     const store = this.tracks?.store(message.track);
     if (!store) return;
     try {

@@ -21,6 +21,8 @@ export class TrackSet {
   readonly scenes: SceneBlockStore[] = [];
   /** Store of the first audio track that can be played, if any. */
   audio: AudioBlockStore | null = null;
+  /** Descriptions of the extension tracks, by index. */
+  readonly extensions = new Map<number, Track>();
   /** Number of tracks that were described. */
   describedCount = 0;
   /** Stores by the track's index in the Description. */
@@ -48,6 +50,7 @@ export class TrackSet {
     descriptions.forEach((description, nth) => {
       const index = first + nth;
       if (index < this.describedCount) return;
+      if (description.type === "extension") this.extensions.set(index, description);
       try {
         const store = this.createStore(description);
         if (store) this.stores.set(index, store);

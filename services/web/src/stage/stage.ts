@@ -3,7 +3,8 @@
  * reads no clock.
  */
 import { type IUniform, Scene, Vector3, type WebGLRenderer } from "three";
-import { type Figure, LIMBS, type Pose } from "../motion/skeleton";
+import type { StagedPose } from "../motion/extension";
+import { type Figure, LIMBS } from "../motion/skeleton";
 import type { LightState } from "../playout/light-state";
 import { limbNumber } from "../wire/limbs";
 import { AudienceCamera, type Framing } from "./camera/audience-camera";
@@ -210,7 +211,7 @@ export class Stage {
    * microseconds, which the recorded camera refers to.
    */
   draw(
-    poses: readonly (Pose | null)[],
+    poses: readonly (StagedPose | null)[],
     states: readonly StringState[] = [],
     interval = 0,
     motionCamera: ArrayLike<number> | null = null,

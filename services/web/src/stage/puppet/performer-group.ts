@@ -1,6 +1,7 @@
 /** Performers on the stage: a puppet, or an avatar in its place, for each performer of the motion. */
 import { Group, type IUniform, Vector3 } from "three";
-import { type Figure, LIMBS, type Pose } from "../../motion/skeleton";
+import type { StagedPose } from "../../motion/extension";
+import { type Figure, LIMBS } from "../../motion/skeleton";
 import type { ScreenBox, WorldExtent } from "../camera/screen-box";
 import type { ScreenProjection } from "../camera/screen-projection";
 import type { Performer } from "./performer";
@@ -92,7 +93,7 @@ export class PerformerGroup {
    * Apply one pose per performer; without one it keeps its last. `seconds` advances the swing of loose parts; 0 stops
    * it.
    */
-  apply(poses: readonly (Pose | null)[], seconds: number): void {
+  apply(poses: readonly (StagedPose | null)[], seconds: number): void {
     this.#performers.forEach((performer, k) => {
       const pose = poses[k];
       if (!pose) return;

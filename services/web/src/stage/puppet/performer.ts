@@ -1,6 +1,7 @@
 /** A performer as stage, strings and limb controls see it: the puppet, or an avatar in its place. */
 import { type Group, type Matrix4, Vector3 } from "three";
-import type { Figure, Pose } from "../../motion/skeleton";
+import type { StagedPose } from "../../motion/extension";
+import type { Figure } from "../../motion/skeleton";
 import { SIDES, SOLE_HEIGHT_M } from "./standard-figure";
 
 export interface Performer {
@@ -19,7 +20,7 @@ export interface Performer {
   /** Uses materials for machines without a graphics processor. */
   usesSimpleMaterials: boolean;
   /** Apply a pose. `seconds` since the last one advances the swing of loose parts; 0 stops it. */
-  apply(pose: Pose, seconds: number): void;
+  apply(pose: StagedPose, seconds: number): void;
   /** Write the world position of a limb's handle into `out` (0 left hand, 1 right hand, 2 left knee, 3 right knee). */
   handle(limb: number, out: Vector3): Vector3;
   /** Return the world matrix of a joint of the streamed figure. */

@@ -1,6 +1,7 @@
 /** The mesh of the puppet. It needs no renderer: it can be built while that is still loading. */
 import type { BufferGeometry } from "three";
 import { type Figure, figureKey, JOINTS } from "../../motion/skeleton";
+import { TRUNK_BONES } from "./extended-bones";
 import { fitToFigure } from "./figure-fit";
 import { GeometryBuilder } from "./geometry-builder";
 import { addArms } from "./parts/arms";
@@ -11,8 +12,8 @@ import { addLegs } from "./parts/legs";
 import { addSleeves } from "./parts/sleeves";
 import type { Detail } from "./surface";
 
-/** Bones in the order of the geometry's skin indices: the joints of the contract, then the two sleeves. */
-export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve"];
+/** Bones in the order of the geometry's skin indices: the joints of the contract, the two sleeves, then the trunk's. */
+export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve", ...TRUNK_BONES];
 
 /** Mesh that was built ahead, and what it was built for. */
 let prepared: { readonly key: string; readonly geometry: BufferGeometry } | null = null;

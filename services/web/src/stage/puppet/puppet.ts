@@ -5,18 +5,23 @@ import {
   Group,
   type Material,
   Matrix4,
+  Quaternion,
   Skeleton,
   SkinnedMesh,
   Sphere,
-  type Vector3,
+  Vector3,
 } from "three";
-import { type Figure, JOINTS, PARENTS, type Pose } from "../../motion/skeleton";
+import type { StagedPose } from "../../motion/extension";
+import { createWorldTransforms, type Figure, JOINTS, PARENTS, worldTransforms } from "../../motion/skeleton";
+import { ExtendedBones, TRUNK_BONES } from "./extended-bones";
 import { figureScale, restPositions } from "./figure-fit";
 import { floorHeight, handlePosition, type Performer } from "./performer";
 import type { PuppetAssets } from "./puppet-assets";
 import { BONES } from "./puppet-geometry";
 import { SleeveBone } from "./sleeve-bone";
 import { SIDES } from "./standard-figure";
+
+const rotation = new Quaternion();
 
 export class Puppet implements Performer {
   readonly group = new Group();
@@ -26,6 +31,11 @@ export class Puppet implements Performer {
   readonly #ankleHeight: number;
   readonly #bones: Bone[];
   readonly #sleeves: SleeveBone[];
+  readonly #extendedBones: ExtendedBones;
+  /** World matrices of the streamed figure's joints, while an extension moves the bones elsewhere. */
+  readonly #streamedJoints = new Map<string, Matrix4>();
+  readonly #streamedWorld = createWorldTransforms();
+  #isExtended = false;
   readonly #assets: PuppetAssets;
   readonly #mesh: SkinnedMesh<BufferGeometry, Material>;
   readonly #reflection: SkinnedMesh<BufferGeometry, Material>;
@@ -37,6 +47,7 @@ export class Puppet implements Performer {
     this.#ankleHeight = -figure.offsets[JOINTS.indexOf("l_midtarsal") * 3 + 1];
     this.group.name = "puppet";
     this.#bones = createBones(figure);
+    this.#extendedBones = new ExtendedBones(figure, (name) => this.#bone(name));
     this.group.add(this.#bone("humanoid_root"), this.#bone("l_sleeve"), this.#bone("r_sleeve"));
     this.group.updateMatrixWorld(true);
     const skeleton = new Skeleton(this.#bones);
@@ -61,7 +72,7 @@ export class Puppet implements Performer {
       const joints = {
         shoulder: this.#bone(`${side}_shoulder`),
         elbow: this.#bone(`${side}_elbow`),
-        chest: this.#bone("vl5"),
+        chest: this.#bone("chest"),
       };
       return new SleeveBone(this.#bone(`${side}_sleeve`), side, joints, along);
     });
@@ -87,30 +98,51 @@ export class Puppet implements Performer {
     this.#mesh.geometry = this.#reflection.geometry = geometry;
   }
 
-  apply(pose: Pose, seconds: number): void {
+  apply(pose: StagedPose, seconds: number): void {
+    if (this.#isExtended && !pose.extended) this.#extendedBones.reset();
+    this.#isExtended = Boolean(pose.extended);
     this.#bones[0].position.fromArray(pose.root);
     for (let k = 0; k < JOINTS.length; k++) {
       const q = pose.rotations;
       this.#bones[k].quaternion.set(q[k * 4 + 1], q[k * 4 + 2], q[k * 4 + 3], q[k * 4]);
+    }
+    if (pose.extended) {
+      this.#extendedBones.apply(pose.extended);
+      this.#updateStreamedJoints(pose);
     }
     this.#bones[0].updateWorldMatrix(true, true);
     for (const sleeve of this.#sleeves) sleeve.update(seconds);
   }
 
   handle(limb: number, out: Vector3): Vector3 {
-    return handlePosition(this, limb, out);
+    return handlePosition({ joint: (name) => this.#bone(name).matrixWorld, scale: this.scale }, limb, out);
   }
 
-  readonly joint = (name: string): Matrix4 => this.#bone(name).matrixWorld;
+  readonly joint = (name: string): Matrix4 =>
+    (this.#isExtended && this.#streamedJoints.get(name)) || this.#bone(name).matrixWorld;
 
-  toStreamedHandle(_limb: number, to: Vector3, out: Vector3): Vector3 {
-    return out.copy(to);
+  /** The figure's handle is to move as the drawn one has to, which an extension may carry elsewhere. */
+  toStreamedHandle(limb: number, to: Vector3, out: Vector3): Vector3 {
+    const offset = to.clone().sub(this.handle(limb, new Vector3()));
+    return handlePosition(this, limb, out).add(offset);
   }
 
   /** Geometry and materials belong to the shared assets. */
   dispose(): void {
     this.#mesh.skeleton.dispose();
     this.group.removeFromParent();
+  }
+
+  #updateStreamedJoints(pose: StagedPose): void {
+    const { positions, orientations } = worldTransforms(this.figure, pose, this.#streamedWorld);
+    JOINTS.forEach((name, k) => {
+      const matrix = this.#streamedJoints.get(name) ?? new Matrix4();
+      this.#streamedJoints.set(name, matrix);
+      rotation.set(orientations[k * 4 + 1], orientations[k * 4 + 2], orientations[k * 4 + 3], orientations[k * 4]);
+      matrix
+        .makeRotationFromQuaternion(rotation)
+        .setPosition(...(positions.subarray(k * 3, k * 3 + 3) as unknown as [number, number, number]));
+    });
   }
 
   #bone(name: string): Bone {
@@ -128,6 +160,7 @@ function createBones(figure: Figure): Bone[] {
     bones[k].position.fromArray(figure.offsets, k * 3);
     if (PARENTS[k] >= 0) bones[PARENTS[k]].add(bones[k]);
   });
+  for (const name of TRUNK_BONES) bones[JOINTS.indexOf("vl5")].add(bones[BONES.indexOf(name)]);
   const rest = restPositions(figure);
   for (const { side } of SIDES)
     bones[BONES.indexOf(`${side}_sleeve`)].position.copy(rest.get(`${side}_shoulder`) as Vector3);

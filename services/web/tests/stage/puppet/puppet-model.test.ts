@@ -17,7 +17,7 @@ test("the model has every triangle once, with colours, bones and weights", () =>
   ] as const) {
     expect(values.length).toBe(vertices * width);
   }
-  expect(Math.max(...model.bones)).toBe(19);
+  expect(Math.max(...model.bones)).toBe(23);
   for (let vertex = 0; vertex < vertices; vertex++) {
     expect(model.weights.subarray(vertex * 4, vertex * 4 + 4).reduce((sum, weight) => sum + weight)).toBeCloseTo(1, 5);
   }

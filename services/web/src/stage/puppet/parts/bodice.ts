@@ -29,6 +29,17 @@ const OBI = [
   [1.122, -0.04, 0.126, 0.099, 2.25],
 ];
 
+/** Blend of the trunk above the waist, from its lowest joint to the chest, and to the clavicles at the shoulders. */
+export const trunkWeights: VertexWeights = (at) => {
+  const chest = smoothStep(1.09, 1.33, at.y);
+  const clavicle = smoothStep(0.05, 0.16, Math.abs(at.x)) * smoothStep(1.3, 1.42, at.y);
+  return [
+    ["vl5", 1 - chest],
+    ["chest", chest * (1 - clavicle)],
+    [at.x > 0 ? "l_clavicle" : "r_clavicle", chest * clavicle],
+  ];
+};
+
 /** Blend from the hips up to the chest. */
 export const waistWeights: VertexWeights = ({ y }) => {
   const chest = smoothStep(0.98, 1.09, y);
@@ -43,9 +54,9 @@ const yokeWeights: VertexWeights = (at) => {
   const arm = smoothStep(0.13, 0.215, Math.abs(at.x)) * smoothStep(1.3, 1.42, at.y) * 0.45;
   const chest = smoothStep(0.98, 1.09, at.y);
   return [
-    ["vl5", chest * (1 - arm)],
     ["sacroiliac", 1 - chest],
     [at.x > 0 ? "l_shoulder" : "r_shoulder", arm],
+    ...trunkWeights(at).map(([bone, weight]) => [bone, weight * chest * (1 - arm)] as const),
   ];
 };
 
@@ -61,7 +72,7 @@ function frontDepth(x: number, y: number): number {
 export function addBodice(builder: GeometryBuilder): void {
   builder.add(loft(BODICE, 32, 16), yokeWeights, FINISH.kimono);
   for (const { side } of SIDES)
-    builder.add(ball(jointPosition(`${side}_shoulder`), 0.052, [1, 1, 1], 14), "vl5", FINISH.kimono);
+    builder.add(ball(jointPosition(`${side}_shoulder`), 0.052, [1, 1, 1], 14), trunkWeights, FINISH.kimono);
   builder.add(
     grid(
       (u, v) => {
@@ -72,7 +83,7 @@ export function addBodice(builder: GeometryBuilder): void {
       10,
       12,
     ),
-    "vl5",
+    trunkWeights,
     FINISH.throat,
   );
   // White inner pair first. In the outer pair the left lies over the right, as the living wear it.
@@ -134,7 +145,7 @@ function addCollar(
       6,
       (u, v) => [v * 0.1, u * 0.5],
     ),
-    "vl5",
+    trunkWeights,
     finish,
   );
 }

@@ -1,7 +1,7 @@
 /** Neck, carved head, ears, hair and the folded topknot (mage). */
 import { Vector3 } from "three";
 import { FINISH } from "../finish";
-import type { GeometryBuilder } from "../geometry-builder";
+import type { GeometryBuilder, VertexWeights } from "../geometry-builder";
 import { HEAD_CENTRE } from "../standard-figure";
 import { ball, curve, grid, lathe, ring, smoothStep, tube } from "../surface";
 
@@ -81,10 +81,19 @@ function sphereDirection(azimuth: number, fall: number): Vector3 {
   return new Vector3(Math.sin(azimuth) * Math.sin(fall), Math.cos(fall), Math.cos(azimuth) * Math.sin(fall));
 }
 
+/** Blend from the chest up to the neck. */
+const neckWeights: VertexWeights = ({ y }) => {
+  const neck = smoothStep(1.47, 1.55, y);
+  return [
+    ["chest", 1 - neck],
+    ["neck", neck],
+  ];
+};
+
 export function addHead(builder: GeometryBuilder): void {
   builder.add(
     lathe(new Vector3(0.002, 1.575, 0.012), new Vector3(0.001, 1.44, -0.02), NECK, { rows: 14 }),
-    "vl5",
+    neckWeights,
     FINISH.gofun,
   );
   builder.add(

@@ -40,7 +40,7 @@ export function addSleeves(builder: GeometryBuilder): void {
     const weights: VertexWeights = ({ y }) => {
       const arm = smoothStep(1.475, 1.37, y);
       return [
-        ["vl5", (1 - arm) * 0.55],
+        [`${side}_clavicle`, (1 - arm) * 0.55],
         [`${side}_shoulder`, 0.45 + 0.55 * arm],
       ];
     };

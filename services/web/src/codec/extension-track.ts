@@ -1,0 +1,204 @@
+/**
+ * Extension tracks: further joints of a performer beside its motion, and the decoder of their blocks
+ * (`proto/codec.md`, 2.17).
+ */
+
+import { type BodyExtension, extensionKinds, extensionNames, type JointKind, SPINE_NAMES } from "../motion/extension";
+import { JOINTS } from "../motion/skeleton";
+import { length } from "../motion/vector";
+import { type ChannelLayout, createLayout } from "./channel-layout";
+import { decodeCoefficients } from "./coefficients";
+import { DamagedBlock } from "./errors";
+import { reconstruct, stepSize } from "./motion-decoder";
+import { loadShippedPrior, type Prior } from "./prior";
+import { MAX_BLOCK_FRAMES, parseTiming, Timing, type TrackDescription } from "./timing";
+import { cosineBasis } from "./transform";
+
+export const EXTENSION_CODEC = "bunraku.extension/1";
+const BODY_PART = "body";
+
+/** Units of the integers that describe an extension. */
+const LENGTH_UNIT_M = 1e-4;
+const DRIVE_UNIT = 2 ** -6;
+const REST_UNIT_RAD = 2 ** -12;
+const NECK_BIT = 8;
+const CLAVICLES_BIT = 16;
+const JOINT_BYTES = 21;
+const END_BYTES = 6;
+
+/** Lever arm about a bone, for what turns with it, in metres. */
+const TWIST_RADIUS_M = 0.04;
+/** Channels of a motion whose biases the prior applies to an extension's joints. */
+const PRIOR_CHANNELS: Readonly<Record<JointKind, number>> = {
+  spine: JOINTS.indexOf("vl5") + 1,
+  neck: JOINTS.indexOf("skullbase") + 1,
+  "left clavicle": JOINTS.indexOf("l_shoulder") + 1,
+  "right clavicle": JOINTS.indexOf("r_shoulder") + 1,
+};
+
+const cosines = new Float64Array(MAX_BLOCK_FRAMES);
+
+/** Timing and joints of the extension of one performer, which has this index among the motion's. */
+export class ExtensionTrack extends Timing {
+  readonly layout: ChannelLayout;
+  /** Inverses [E][3][3] of the weights with which values were multiplied before they were quantised. */
+  readonly inverseWeights: Float64Array;
+
+  constructor(
+    timing: Timing,
+    readonly performer: number,
+    readonly extension: BodyExtension,
+  ) {
+    super(timing.fps, timing.frames, timing.blockFrames, timing.firstFrames);
+    this.layout = extensionLayout(extension.kinds);
+    this.inverseWeights = inverseJointWeights(extension);
+  }
+
+  /**
+   * Returns the track of a Description's map of type `extension`.
+   *
+   * @throws DamagedBlock if it is invalid or of another codec or part
+   */
+  static fromDescription(description: TrackDescription): ExtensionTrack {
+    const { codec, part, performer, joints } = description;
+    if (codec !== EXTENSION_CODEC || part !== BODY_PART)
+      throw new DamagedBlock(`Unsupported extension of codec ${String(codec)} and part ${String(part)}.`);
+    const timing = parseTiming(description, "extension");
+    if (!Number.isInteger(performer) || Number(performer) < 0 || !(joints instanceof Uint8Array))
+      throw new DamagedBlock("Invalid extension track: performer must be an index, and joints must be bytes.");
+    return new ExtensionTrack(timing, Number(performer), unpackExtension(joints));
+  }
+}
+
+/**
+ * Returns the extension that the bytes of `joints` describe.
+ *
+ * @throws DamagedBlock
+ */
+export function unpackExtension(data: Uint8Array): BodyExtension {
+  const flags = data[0] ?? 0;
+  const spineCount = flags & 7;
+  const kinds = extensionKinds(spineCount, (flags & NECK_BIT) !== 0, (flags & CLAVICLES_BIT) !== 0);
+  const count = kinds.length;
+  const expected = 1 + count * JOINT_BYTES + 3 * END_BYTES;
+  if (spineCount >= SPINE_NAMES.length || count === 0 || flags >> 5 || data.length !== expected) {
+    throw new DamagedBlock(
+      `Invalid extension: its first byte is ${flags} and it has ${data.length} bytes, expected ${expected} bytes and ` +
+        `1..${SPINE_NAMES.length - 1} joints of the spine, a neck or clavicles.`,
+    );
+  }
+  const view = new DataView(data.buffer, data.byteOffset, data.length);
+  const integers = (at: number, size: number, unit: number) =>
+    Array.from({ length: size }, (_, i) => view.getInt16(at + 2 * i, true) * unit);
+  const joints = kinds.map((_, joint) => 1 + joint * JOINT_BYTES);
+  return {
+    kinds,
+    names: extensionNames(kinds),
+    offsets: Float64Array.from(joints.flatMap((at) => integers(at, 3, LENGTH_UNIT_M))),
+    rest: Float64Array.from(joints.flatMap((at) => integers(at + 6, 3, REST_UNIT_RAD))),
+    drive: Float64Array.from(
+      joints.flatMap((at) => Array.from({ length: 9 }, (_, i) => view.getInt8(at + 12 + i) * DRIVE_UNIT)),
+    ),
+    ends: Float64Array.from(integers(1 + count * JOINT_BYTES, 9, LENGTH_UNIT_M)),
+  };
+}
+
+/** A decoded block. */
+export class ExtensionBlock {
+  /**
+   * @param frames frames of the block
+   * @param count frequencies of each value
+   * @param values coefficients [E][axis 3][count], radians
+   */
+  constructor(
+    readonly frames: number,
+    private readonly count: number,
+    private readonly values: Float64Array,
+  ) {}
+
+  /** Writes the values [E][3] at `t`, in frames from the block's first, any real in [-1/2, frames - 1/2], into `out`. */
+  valuesAt(t: number, out: Float64Array): void {
+    const { count, values } = this;
+    cosineBasis(cosines, this.frames, count, t);
+    for (let number = 0, at = 0; number < out.length; number++) {
+      let sum = 0;
+      for (let k = 0; k < count; k++) sum += values[at++] * cosines[k];
+      out[number] = sum;
+    }
+  }
+}
+
+/**
+ * Decodes one block of `track`. `prior` must be the one with which the block was encoded.
+ *
+ * @throws DamagedBlock
+ */
+export function decodeExtensionBlock(
+  track: ExtensionTrack,
+  data: Uint8Array,
+  prior: Prior = loadShippedPrior(),
+): ExtensionBlock {
+  const { layout, inverseWeights } = track;
+  const { frames, step, count, q } = decodeCoefficients(prior, data, track.blockFrames, track.fps, layout);
+  const size = stepSize(step, frames);
+  const values = new Float64Array(layout.count * 3 * count);
+  for (let joint = 0; joint < layout.count; joint++) {
+    for (let k = 0; k < count; k++) {
+      for (let axis = 0; axis < 3; axis++) {
+        let sum = 0;
+        for (let other = 0; other < 3; other++)
+          sum += inverseWeights[joint * 9 + axis * 3 + other] * reconstruct(q[(joint * 3 + other) * count + k]) * size;
+        values[(joint * 3 + axis) * count + k] = sum;
+      }
+    }
+  }
+  return new ExtensionBlock(frames, count, values);
+}
+
+/** Returns the layout of an extension: the spine is a chain, of which neck and clavicles are the last link. */
+function extensionLayout(kinds: readonly JointKind[]): ChannelLayout {
+  const chest = kinds.lastIndexOf("spine");
+  return createLayout(
+    kinds.map((kind) => PRIOR_CHANNELS[kind]),
+    kinds.map((kind, joint) => (kind === "spine" ? joint - 1 : chest)),
+    kinds.map((_, joint) => joint - 1),
+  );
+}
+
+/** Returns the inverses of the weights: the lever arm about each axis of what a joint carries. */
+function inverseJointWeights({ kinds, offsets, ends }: BodyExtension): Float64Array {
+  const count = kinds.length;
+  const [left, right] = [ends.slice(3, 6), ends.slice(6, 9)];
+  if (kinds.at(-1) === "right clavicle") {
+    for (let i = 0; i < 3; i++) {
+      left[i] += offsets[(count - 2) * 3 + i];
+      right[i] += offsets[(count - 1) * 3 + i];
+    }
+  }
+  const radius = Math.hypot(left[0] - right[0], left[1] - right[1], left[2] - right[2]) / 2;
+  const arm = left.map((value, i) => (value + right[i]) / 2);
+  const inverses = new Float64Array(count * 9);
+  for (let joint = count - 1; joint >= 0; joint--) {
+    const kind = kinds[joint];
+    if (kind === "spine") {
+      writeInverseWeight(inverses, joint * 9, arm, radius);
+      for (let i = 0; i < 3; i++) arm[i] += offsets[joint * 3 + i];
+    } else {
+      const end = kind === "neck" ? 0 : kind === "left clavicle" ? 1 : 2;
+      writeInverseWeight(inverses, joint * 9, ends.slice(end * 3, end * 3 + 3), 0);
+    }
+  }
+  return inverses;
+}
+
+/** Writes the inverse weight of a joint that carries a point at `arm`, and others around it at `radius`. */
+function writeInverseWeight(out: Float64Array, at: number, arm: Float64Array, radius: number): void {
+  const square = TWIST_RADIUS_M ** 2 + radius ** 2;
+  const size = length(arm, 0);
+  const along = 1 / Math.sqrt(square),
+    across = 1 / Math.sqrt(square + size * size);
+  for (let row = 0; row < 3; row++)
+    for (let column = 0; column < 3; column++)
+      out[at + row * 3 + column] =
+        (row === column ? across : 0) + ((along - across) * arm[row] * arm[column]) / Math.max(size, 1e-9) ** 2;
+}

@@ -1,0 +1,65 @@
+import * as fc from "fast-check";
+import { describe, expect, test } from "vitest";
+import { decodeCoefficients } from "../../src/codec/coefficients";
+import { DamagedBlock } from "../../src/codec/errors";
+import { decodeExtensionBlock, ExtensionTrack } from "../../src/codec/extension-track";
+import { loadShippedPrior } from "../../src/codec/prior";
+import { extensionVectors, goldenExtensionTrack } from "../golden-extensions";
+import { decodeBase64 } from "../golden-vectors";
+
+const golden = extensionVectors();
+const tracks = golden.tracks.map(goldenExtensionTrack);
+
+describe("golden blocks", () => {
+  test.each(golden.valid)("block of track $track, $frames frames at step $step", (vector) => {
+    const track = tracks[vector.track];
+    const data = decodeBase64(vector.block);
+    const { frames, step, q } = decodeCoefficients(
+      loadShippedPrior(),
+      data,
+      track.blockFrames,
+      track.fps,
+      track.layout,
+    );
+    expect([frames, step]).toEqual([vector.frames, vector.step]);
+    expect([...q]).toEqual(vector.q);
+    const block = decodeExtensionBlock(track, data);
+    const out = new Float64Array(track.layout.count * 3);
+    for (const { instant, numbers } of vector.values) {
+      block.valuesAt(instant, out);
+      numbers.forEach((value, n) => expect(out[n]).toBeCloseTo(value, 11));
+    }
+  });
+
+  test.each(golden.invalid)("$why is refused", ({ block }) => {
+    expect(() => decodeExtensionBlock(tracks[0], decodeBase64(block))).toThrow(DamagedBlock);
+  });
+});
+
+test("names of the joints follow their number", () => {
+  expect(tracks.map(({ extension }) => extension.names)).toEqual(golden.tracks.map(({ names }) => names));
+});
+
+test.each(golden.invalid_tracks)("description with $why is refused", ({ track }) => {
+  expect(() => goldenExtensionTrack(track)).toThrow(DamagedBlock);
+});
+
+test("description without timing is refused", () => {
+  const joints = decodeBase64(golden.tracks[0].joints as string);
+  expect(() => ExtensionTrack.fromDescription({ ...golden.tracks[0], joints, frames: 0 })).toThrow(DamagedBlock);
+});
+
+test("damaged block gives finite values or is refused", () => {
+  fc.assert(
+    fc.property(fc.uint8Array({ maxLength: 300 }), (data) => {
+      try {
+        const block = decodeExtensionBlock(tracks[0], data);
+        const out = new Float64Array(tracks[0].layout.count * 3);
+        block.valuesAt(block.frames - 0.5, out);
+        expect(out.every(Number.isFinite)).toBe(true);
+      } catch (error) {
+        expect(error).toBeInstanceOf(DamagedBlock);
+      }
+    }),
+  );
+});
