@@ -1,12 +1,17 @@
-/** Download of one performer's motion at the highest bitrate level over HTTP, except for blocks that a viewer holds. */
+/**
+ * Download of one performer's motion, and of its extension, at the highest bitrate level over HTTP, except for blocks
+ * that a viewer holds.
+ */
 
 import { DamagedBlock } from "../codec/errors";
+import { ExtensionTrack } from "../codec/extension-track";
 import { MotionTrack } from "../codec/motion-track";
-import { parseTiming } from "../codec/timing";
-import { MotionBlockStore } from "../playout/block-store";
+import { parseLadder, parseTiming, type Timing } from "../codec/timing";
+import { MotionBlockStore, type TrackBlockStore } from "../playout/block-store";
+import { ExtensionBlockStore } from "../playout/extension-poses";
 import { unpackServerMessage } from "../wire/client-codec";
 import { MalformedMessage } from "../wire/errors";
-import type { Message } from "../wire/messages";
+import type { Message, Track } from "../wire/messages";
 import { pageAccess } from "./access";
 import { ProblemError } from "./problem";
 
@@ -22,16 +27,31 @@ export interface MotionDownloadOptions {
   signal?: AbortSignal;
 }
 
+/** A downloaded motion, the number of frames to use, and the extension, null if there is none that can be read. */
+export interface DownloadedMotion {
+  store: MotionBlockStore;
+  frames: number;
+  extension: ExtensionBlockStore | null;
+}
+
+/** Blocks of a track that are to be fetched. */
+interface MissingBlocks {
+  track: number;
+  store: TrackBlockStore<Timing, { readonly frames: number }>;
+  level: number;
+  indices: number[];
+}
+
 /**
- * Download a performer's blocks at the highest level. Return the store and the number of frames to use: a motion is as
- * long as the track of its first performer, so a longer track is cut.
+ * Download a performer's blocks at the highest level. A motion is as long as the track of its first performer, so a
+ * longer track is cut.
  *
  * @throws ProblemError if the download fails, or the reason of `signal` if it is aborted
  */
 export async function downloadMotion(
   motion: string,
   { performer = 0, existing = null, onProgress, signal }: MotionDownloadOptions = {},
-): Promise<{ store: MotionBlockStore; frames: number }> {
+): Promise<DownloadedMotion> {
   const base = `/v1/motions/${encodeURIComponent(motion)}`;
   try {
     const { tracks } = await fetchMessage(`${base}/description`, "Description", signal);
@@ -44,25 +64,56 @@ export async function downloadMotion(
     if (existing) store.mergeFrom(existing);
     const { durationUs } = parseTiming(tracks[motionTracks[0]], "motion");
     const frames = Math.min(track.frames, Math.max(1, Math.round((durationUs * track.fps) / 1e6)));
-    const highest = track.ladder.length - 1;
-    const required = [...store.levels.keys()].filter((index) => track.firstFrame(index) < frames);
-    const missing = required.filter((index) => store.levels[index] < highest);
-    let doneCount = required.length - missing.length;
+    const isUsed = (index: number) => track.firstFrame(index) < frames;
+    const missing = [missingBlocks(trackIndex, store, track.ladder.length - 1, isUsed)];
+    const found = findExtension(tracks, performer);
+    if (found) missing.push(missingBlocks(found.index, found.store, found.highest, isUsed));
+    const requests = missing.flatMap((each) => each.indices.map((index) => ({ ...each, index })));
+    const total = Math.max(requests.length, 1);
+    let doneCount = 0;
     const fetchMissing = async () => {
-      for (let index = missing.shift(); index !== undefined; index = missing.shift()) {
-        const { block } = await fetchMessage(`${base}/blocks/${highest}/${index}?track=${trackIndex}`, "Data", signal);
-        store.put(index, highest, block);
+      for (let request = requests.shift(); request !== undefined; request = requests.shift()) {
+        const { track: number, level, index } = request;
+        const { block } = await fetchMessage(`${base}/blocks/${level}/${index}?track=${number}`, "Data", signal);
+        request.store.put(index, level, block);
         signal?.throwIfAborted();
-        onProgress?.(++doneCount / required.length);
+        onProgress?.(++doneCount / total);
       }
     };
     await Promise.all(Array.from({ length: MAX_CONCURRENT_REQUESTS }, fetchMissing));
-    return { store, frames };
+    return { store, frames, extension: found?.store ?? null };
   } catch (error) {
     signal?.throwIfAborted();
     if (error instanceof DamagedBlock || error instanceof MalformedMessage)
       throw new ProblemError(0, "This motion cannot be read", error.message);
     throw error;
+  }
+}
+
+/** Return the blocks of a store that are used and not there at this level. */
+function missingBlocks(
+  track: number,
+  store: MissingBlocks["store"],
+  level: number,
+  isUsed: (index: number) => boolean,
+): MissingBlocks {
+  const indices = [...store.levels.keys()].filter((index) => isUsed(index) && store.levels[index] < level);
+  return { track, store, level, indices };
+}
+
+/** Return the extension of a performer with the index of its track and its highest level; null if there is none. */
+function findExtension(
+  tracks: readonly Track[],
+  performer: number,
+): { index: number; store: ExtensionBlockStore; highest: number } | null {
+  const index = tracks.findIndex((track) => track.type === "extension" && track.performer === performer);
+  if (index < 0) return null;
+  try {
+    const store = new ExtensionBlockStore(ExtensionTrack.fromDescription(tracks[index]));
+    return { index, store, highest: parseLadder(tracks[index], "extension").length - 1 };
+  } catch (error) {
+    if (!(error instanceof DamagedBlock)) throw error;
+    return null;
   }
 }
 

@@ -1,8 +1,9 @@
 /** BVH export, equivalent to `motion/bvh_writer.py` in Python. */
 
 import { applyPlacement } from "../motion/placement";
-import { JOINT_COUNT, JOINTS, PARENTS, restPose, TIP_JOINTS } from "../motion/skeleton";
-import { FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
+import { restPose } from "../motion/skeleton";
+import { ExportSkeleton } from "./export-skeleton";
+import { extensionValuesAt, FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
 const CENTIMETRES_PER_METRE = 100;
 const DEGREES_PER_RADIAN = 180 / Math.PI;
@@ -17,18 +18,20 @@ const encoder = new TextEncoder();
 export function* writeBvh(motion: SampledMotion): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const { fps, frames, placement: place } = motion;
   const frameTime = Number((1 / fps).toPrecision(10));
+  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension);
   const parts = [
     encoder.encode(
-      [...formatHierarchy(motion), "MOTION", `Frames: ${frames}`, `Frame Time: ${frameTime}`, ""].join("\n"),
+      [...formatHierarchy(skeleton), "MOTION", `Frames: ${frames}`, `Frame Time: ${frameTime}`, ""].join("\n"),
     ),
   ];
-  const values = new Float64Array(3 + JOINT_COUNT * 3);
+  const values = new Float64Array(3 + skeleton.count * 3);
+  const rotations = new Float64Array(skeleton.count * 4);
   const pose = restPose();
   let rows = "";
   for (let frame = 0; frame < frames; frame++) {
-    const { root, rotations } = applyPlacement(poseAt(motion, frame, pose), place);
-    for (let axis = 0; axis < 3; axis++) values[axis] = root[axis] * CENTIMETRES_PER_METRE;
-    for (let joint = 0; joint < JOINT_COUNT; joint++) toEulerZxy(values, 3 + joint * 3, rotations, joint * 4);
+    skeleton.rotations(applyPlacement(poseAt(motion, frame, pose), place), extensionValuesAt(motion, frame), rotations);
+    for (let axis = 0; axis < 3; axis++) values[axis] = pose.root[axis] * CENTIMETRES_PER_METRE;
+    for (let joint = 0; joint < skeleton.count; joint++) toEulerZxy(values, 3 + joint * 3, rotations, joint * 4);
     rows += `${formatRow(values)}\n`;
     if (frame % FRAMES_PER_STEP !== FRAMES_PER_STEP - 1 && frame !== frames - 1) continue;
     parts.push(encoder.encode(rows));
@@ -60,20 +63,20 @@ export function toEulerZxy(out: Float64Array, outAt: number, q: Float64Array, at
   out[outAt + 2] = locked ? 0 : DEGREES_PER_RADIAN * Math.atan2(across, along);
 }
 
-function formatHierarchy({ figure }: SampledMotion): string[] {
+function formatHierarchy({ names, parents, offsets, tips }: ExportSkeleton): string[] {
   const lines = ["HIERARCHY"];
   const depths: number[] = [];
   let open = 0;
   const close = (depth: number) => {
     while (open > depth) lines.push(`${"\t".repeat(--open)}}`);
   };
-  JOINTS.forEach((name, joint) => {
-    const depth = joint === 0 ? 0 : depths[PARENTS[joint]] + 1;
+  names.forEach((name, joint) => {
+    const depth = joint === 0 ? 0 : depths[parents[joint]] + 1;
     depths.push(depth);
     close(depth);
     const indent = "\t".repeat(depth);
     const [kind, channels] = joint === 0 ? ["ROOT", "6 Xposition Yposition Zposition"] : ["JOINT", "3"];
-    const offset = joint === 0 ? [0, 0, 0] : toCentimetres(figure.offsets, joint);
+    const offset = joint === 0 ? [0, 0, 0] : toCentimetres(offsets, joint);
     lines.push(
       `${indent}${kind} ${name}`,
       `${indent}{`,
@@ -81,11 +84,12 @@ function formatHierarchy({ figure }: SampledMotion): string[] {
       `${indent}\tCHANNELS ${channels} Zrotation Xrotation Yrotation`,
     );
     open = depth + 1;
-    if (TIP_JOINTS.includes(joint))
+    const tip = tips.get(joint);
+    if (tip)
       lines.push(
         `${indent}\tEnd Site`,
         `${indent}\t{`,
-        `${indent}\t\tOFFSET ${formatRow(toCentimetres(figure.tips, joint))}`,
+        `${indent}\t\tOFFSET ${formatRow(toCentimetres(tip, 0))}`,
         `${indent}\t}`,
       );
   });

@@ -2,6 +2,7 @@
 
 import { type Figure, figureKey } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
+import type { ExtensionBlockStore } from "../playout/extension-poses";
 import { writeBvh } from "./bvh";
 import { type AnimatedPuppet, type PuppetModel, writeGlb } from "./glb";
 import { type IncrementalTask, type SampledMotion, sampleMotion } from "./sampled-motion";
@@ -32,6 +33,8 @@ export interface ExportOptions {
 export interface ExportSource {
   store: MotionBlockStore;
   frames: number;
+  /** Blocks of its extension, if it has one. */
+  extension?: ExtensionBlockStore | null;
 }
 
 /**
@@ -50,10 +53,10 @@ export async function exportFile(
   });
   const motions: SampledMotion[] = [];
   const sampleShare = 0.5 / sources.length;
-  for (const { store, frames } of sources)
+  for (const { store, frames, extension } of sources)
     motions.push(
       await runInSlices(
-        sampleMotion(store, frames),
+        sampleMotion(store, frames, extension),
         sliceOptions(motions.length * sampleShare, (motions.length + 1) * sampleShare),
       ),
     );

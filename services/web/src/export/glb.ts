@@ -2,10 +2,12 @@
  * GLB export: the puppets, their joints under H-Anim names, and the animation, for Blender, viewers and game engines.
  */
 
+import { CLAVICLE_NAMES, NECK_NAME, type StagedPose } from "../motion/extension";
 import type { Placement } from "../motion/placement";
-import { type Figure, JOINT_COUNT, JOINTS, PARENTS, type Pose, restPose } from "../motion/skeleton";
+import { type Figure, JOINTS, restPose } from "../motion/skeleton";
+import { ExportSkeleton } from "./export-skeleton";
 import { frameTimes, type GltfArray, GltfBuilder, writeRotation } from "./gltf";
-import { FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
+import { extensionValuesAt, FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
 /** The puppet of one performer as a mesh in its rest pose, and the movement of its two sleeves. */
 export interface PuppetModel {
@@ -13,7 +15,7 @@ export interface PuppetModel {
   positions: Float32Array<ArrayBuffer>;
   normals: Float32Array<ArrayBuffer>;
   colours: Float32Array<ArrayBuffer>;
-  /** Per vertex: four joints (0-17) or sleeves (18, 19) and their weights. */
+  /** Per vertex: four bones, in the order of `MESH_BONES`, and their weights. */
   bones: Uint8Array<ArrayBuffer>;
   weights: Float32Array<ArrayBuffer>;
   /** Per vertex: position on the face texture, from its upper left corner. */
@@ -25,12 +27,13 @@ export interface PuppetModel {
    * Write the sleeves' rotations (8, w x y z) in their shoulders' frames for `pose`, `seconds` after the last one; 0
    * for the first.
    */
-  poseSleeves(pose: Pose, seconds: number, out: Float64Array): void;
+  poseSleeves(pose: StagedPose, seconds: number, out: Float64Array): void;
 }
 
-const SHOULDERS = [JOINTS.indexOf("l_shoulder"), JOINTS.indexOf("r_shoulder")] as const;
+const SHOULDERS = ["l_shoulder", "r_shoulder"] as const;
 const SLEEVES = ["l_sleeve", "r_sleeve"] as const;
-const BONE_COUNT = JOINT_COUNT + SLEEVES.length;
+/** Bones of a puppet's mesh: the figure's joints, its sleeves, and those of the trunk that an extension moves. */
+const MESH_BONES: readonly string[] = [...JOINTS, ...SLEEVES, "chest", "neck", "l_clavicle", "r_clavicle"];
 const PBR_MATERIAL = { metallicFactor: 0, roughnessFactor: 0.6 };
 
 /** A motion and its puppet; a model used several times is written once. */
@@ -60,21 +63,34 @@ export function* writeGlb(
 /** Animate the joints and sleeves, which are the nodes from `first` on. */
 function* addAnimation(asset: GltfBuilder, first: number, { motion, model }: AnimatedPuppet): IncrementalTask<void> {
   const { fps, frames, roots } = motion;
-  const rotations = Array.from({ length: BONE_COUNT }, () => new Float32Array(frames * 4));
-  const pose = restPose(),
-    sleeveRotations = new Float64Array(8);
+  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension);
+  const rotations = Array.from({ length: skeleton.count + SLEEVES.length }, () => new Float32Array(frames * 4));
+  const pose: StagedPose = restPose();
+  const sleeveRotations = new Float64Array(8),
+    jointRotations = new Float64Array(skeleton.count * 4);
   for (let frame = 0; frame < frames; frame++) {
-    poseAt(motion, frame, pose);
+    const values = extensionValuesAt(motion, frame);
+    skeleton.rotations(poseAt(motion, frame, pose), values, jointRotations);
+    pose.extended = skeleton.extend(pose, values);
     model.poseSleeves(pose, frame === 0 ? 0 : 1 / fps, sleeveRotations);
-    for (let joint = 0; joint < JOINT_COUNT; joint++)
-      writeRotation(rotations[joint], frame * 4, pose.rotations, joint * 4);
+    for (let joint = 0; joint < skeleton.count; joint++)
+      writeRotation(rotations[joint], frame * 4, jointRotations, joint * 4);
     for (let sleeve = 0; sleeve < SLEEVES.length; sleeve++)
-      writeRotation(rotations[JOINT_COUNT + sleeve], frame * 4, sleeveRotations, sleeve * 4);
+      writeRotation(rotations[skeleton.count + sleeve], frame * 4, sleeveRotations, sleeve * 4);
     if (frame % FRAMES_PER_STEP === 0) yield frame / frames;
   }
   const times = asset.addAccessor(frameTimes(frames, fps), "SCALAR", { bounded: true });
   asset.addChannel(first, "translation", times, Float32Array.from(roots));
   rotations.forEach((turn, bone) => asset.addChannel(first + bone, "rotation", times, turn));
+}
+
+/** Skin of a puppet: the joints that move its mesh, by index in the skeleton, and where the mesh has them at rest. */
+interface PuppetSkin {
+  joints: number[];
+  /** Positions [joint][3] in metres. */
+  places: number[];
+  /** Joint of the skin for each of `MESH_BONES`. */
+  skinOf: number[];
 }
 
 /** Add the puppets at rest. Return the first bone's node of each, and the roots of the scene. */
@@ -88,27 +104,29 @@ function addPuppets(
     skins: object[] = [],
     bones: number[] = [],
     roots: number[] = [];
-  const shared = new Map<PuppetModel, { mesh: number; inverseBindMatrices: number }>();
-  puppets.forEach(({ motion: { figure, placement: place }, model }, index) => {
+  const shared = new Map<PuppetModel, Map<string, { mesh: number; inverseBindMatrices: number }>>();
+  puppets.forEach(({ motion: { figure, placement: place, extension }, model }, index) => {
     const first = nodes.length;
-    const positions = addBones(asset, figure);
-    let sharedParts = shared.get(model);
-    if (!sharedParts) {
-      sharedParts = {
-        mesh: meshes.push(addMesh(asset, model)) - 1,
-        inverseBindMatrices: addInverseBindMatrices(asset, positions),
-      };
-      shared.set(model, sharedParts);
-    }
-    const { mesh, inverseBindMatrices } = sharedParts;
+    const skeleton = new ExportSkeleton(figure, extension?.extension);
+    addBones(asset, skeleton);
+    const skin = createSkin(figure, skeleton);
+    const variants = shared.get(model) ?? new Map<string, { mesh: number; inverseBindMatrices: number }>();
+    shared.set(model, variants);
+    const key = skin.places.join();
+    const parts = variants.get(key) ?? {
+      mesh: meshes.push(addMesh(asset, model, skin)) - 1,
+      inverseBindMatrices: addInverseBindMatrices(asset, skin),
+    };
+    variants.set(key, parts);
     skins.push({
-      joints: Array.from({ length: BONE_COUNT }, (_, bone) => first + bone),
+      joints: skin.joints.map((joint) => first + joint),
       skeleton: first,
-      inverseBindMatrices,
+      inverseBindMatrices: parts.inverseBindMatrices,
     });
     const needsNode = puppets.length > 1 || place.x !== 0 || place.z !== 0 || place.turn !== 0;
     // A skin moves its mesh by the bones alone, so the mesh has no parent.
-    const puppet = nodes.push({ name: needsNode ? `puppet ${index + 1}` : "puppet", mesh, skin: index }) - 1;
+    const name = needsNode ? `puppet ${index + 1}` : "puppet";
+    const puppet = nodes.push({ name, mesh: parts.mesh, skin: index }) - 1;
     roots.push(needsNode ? addPlacementNode(asset, `dancer ${index + 1}`, place, first) : first, puppet);
     bones.push(first);
   });
@@ -127,29 +145,55 @@ function addPuppets(
   return { bones, roots };
 }
 
-/**
- * Add the joints and sleeves of a figure as nodes at rest. Return their positions relative to the figure's origin (60),
- * in metres.
- */
-function addBones({ nodes }: GltfBuilder, { offsets }: Figure): Float64Array {
+/** Add the joints of a skeleton and the sleeves as nodes at rest. */
+function addBones({ nodes }: GltfBuilder, { names, parents, offsets, count }: ExportSkeleton): void {
   const first = nodes.length;
-  const places = new Float64Array(BONE_COUNT * 3);
-  JOINTS.forEach((name, joint) => {
-    const children = PARENTS.flatMap((parent, child) => (parent === joint ? [first + child] : []));
-    SHOULDERS.forEach((shoulder, sleeve) => shoulder === joint && children.push(first + JOINT_COUNT + sleeve));
+  names.forEach((name, joint) => {
+    const children = parents.flatMap((parent, child) => (parent === joint ? [first + child] : []));
+    SHOULDERS.forEach((shoulder, sleeve) => shoulder === name && children.push(first + count + sleeve));
     nodes.push({
       name,
       translation: [...offsets.subarray(joint * 3, joint * 3 + 3)],
       ...(children.length > 0 ? { children } : {}),
     });
-    for (let axis = 0; axis < 3; axis++)
-      places[joint * 3 + axis] = offsets[joint * 3 + axis] + (joint > 0 ? places[PARENTS[joint] * 3 + axis] : 0);
   });
-  SLEEVES.forEach((name, sleeve) => {
-    nodes.push({ name });
-    places.copyWithin((JOINT_COUNT + sleeve) * 3, SHOULDERS[sleeve] * 3, SHOULDERS[sleeve] * 3 + 3);
+  for (const name of SLEEVES) nodes.push({ name });
+}
+
+/**
+ * Return the skin of a puppet's mesh. Limbs and head are bound where the mesh has them, which is where the figure does;
+ * the trunk bends about the joints of the extension.
+ */
+function createSkin(figure: Figure, skeleton: ExportSkeleton): PuppetSkin {
+  const rest = skeleton.restPositions(),
+    figureRest = new ExportSkeleton(figure).restPositions();
+  const vl5 = skeleton.indexOf("vl5");
+  const bends = skeleton.names.length > JOINTS.length && skeleton.chest > 0;
+  const chest = bends ? skeleton.chest : vl5;
+  const trunk = [NECK_NAME, ...CLAVICLE_NAMES].map((name) =>
+    skeleton.indexOf(name) < 0 ? chest : skeleton.indexOf(name),
+  );
+  const skin: PuppetSkin = { joints: [], places: [], skinOf: [] };
+  MESH_BONES.forEach((name, bone) => {
+    const sleeve = SLEEVES.indexOf(name as (typeof SLEEVES)[number]);
+    const isJoint = bone < JOINTS.length;
+    const joint = isJoint
+      ? skeleton.indexOf(name)
+      : sleeve >= 0
+        ? skeleton.count + sleeve
+        : [chest, ...trunk][bone - JOINTS.length - SLEEVES.length];
+    const known = skin.joints.indexOf(joint);
+    skin.skinOf.push(known < 0 ? skin.joints.push(joint) - 1 : known);
+    if (known >= 0) return;
+    const [places, at] =
+      sleeve >= 0
+        ? [figureRest, JOINTS.indexOf(SHOULDERS[sleeve])]
+        : isJoint && !(bends && name === "vl5")
+          ? [figureRest, bone]
+          : [rest, joint];
+    skin.places.push(...places.subarray(at * 3, at * 3 + 3));
   });
-  return places;
+  return skin;
 }
 
 /** Add a node at `placement` with one child. Return its index. */
@@ -164,8 +208,8 @@ function addPlacementNode({ nodes }: GltfBuilder, name: string, { x, z, turn }: 
   );
 }
 
-/** Return the puppet's mesh, for skins with its bones. */
-function addMesh(asset: GltfBuilder, model: PuppetModel): object {
+/** Return the puppet's mesh, for a skin. */
+function addMesh(asset: GltfBuilder, model: PuppetModel, { skinOf }: PuppetSkin): object {
   const vertices = (values: GltfArray, type: "VEC2" | "VEC3" | "VEC4", bounded = false) =>
     asset.addAccessor(values, type, { target: "vertices", bounded });
   const attributes = {
@@ -173,7 +217,10 @@ function addMesh(asset: GltfBuilder, model: PuppetModel): object {
     NORMAL: vertices(model.normals, "VEC3"),
     COLOR_0: vertices(model.colours, "VEC3"),
     TEXCOORD_0: vertices(model.faceUvs, "VEC2"),
-    JOINTS_0: vertices(model.bones, "VEC4"),
+    JOINTS_0: vertices(
+      model.bones.map((bone) => skinOf[bone]),
+      "VEC4",
+    ),
     WEIGHTS_0: vertices(model.weights, "VEC4"),
   };
   const primitives = [model.body, model.face].map((triangles, material) => ({
@@ -185,9 +232,9 @@ function addMesh(asset: GltfBuilder, model: PuppetModel): object {
 }
 
 /** Add the matrices from the mesh to the frames of the bones at rest. Return the accessor's index. */
-function addInverseBindMatrices(asset: GltfBuilder, places: Float64Array): number {
-  const matrices = new Float32Array(BONE_COUNT * 16);
-  for (let bone = 0; bone < BONE_COUNT; bone++) {
+function addInverseBindMatrices(asset: GltfBuilder, { joints, places }: PuppetSkin): number {
+  const matrices = new Float32Array(joints.length * 16);
+  for (let bone = 0; bone < joints.length; bone++) {
     for (let i = 0; i < 4; i++) matrices[bone * 16 + i * 5] = 1;
     for (let axis = 0; axis < 3; axis++) matrices[bone * 16 + 12 + axis] = -places[bone * 3 + axis];
   }

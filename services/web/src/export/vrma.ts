@@ -3,10 +3,12 @@
  * VRMC_vrm_animation-1.0).
  */
 
-import { BONE_COUNT, BONE_PARENTS, BONES, createHumanoidPose, toHumanoid, tPoseFigure } from "../motion/humanoid";
+import { ExtendedHumanoid } from "../motion/extended-humanoid";
+import { BONE_PARENTS, BONES, createHumanoidPose, toHumanoid, tPoseFigure } from "../motion/humanoid";
 import { restPose } from "../motion/skeleton";
+import { ExportSkeleton } from "./export-skeleton";
 import { frameTimes, GltfBuilder, writeRotation } from "./gltf";
-import { FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
+import { extensionValuesAt, FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
 const EXTENSION = "VRMC_vrm_animation";
 
@@ -18,9 +20,14 @@ const EXTENSION = "VRMC_vrm_animation";
 export function* writeVrma(motion: SampledMotion, name: string): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const { figure, fps, frames } = motion;
   const asset = new GltfBuilder();
-  const { offsets } = tPoseFigure(figure);
-  BONES.forEach((bone, at) => {
-    const children = BONE_PARENTS.flatMap((parent, child) => (parent === at ? [child] : []));
+  const extension = motion.extension?.extension;
+  const skeleton = new ExportSkeleton(figure, extension);
+  const extended = extension && new ExtendedHumanoid(figure, extension);
+  const bones = extended ? extended.bones.map((bone) => bone.name) : BONES;
+  const parents = extended ? extended.bones.map(({ parent }) => parent) : BONE_PARENTS;
+  const { offsets } = extended ?? tPoseFigure(figure);
+  bones.forEach((bone, at) => {
+    const children = parents.flatMap((parent, child) => (parent === at ? [child] : []));
     asset.nodes.push({
       name: bone,
       translation: [...offsets.subarray(at * 3, at * 3 + 3)],
@@ -28,14 +35,17 @@ export function* writeVrma(motion: SampledMotion, name: string): IncrementalTask
     });
   });
   const hips = new Float32Array(frames * 3);
-  const rotations = BONES.map(() => new Float32Array(frames * 4));
+  const rotations = bones.map(() => new Float32Array(frames * 4));
   const pose = restPose(),
     humanoid = createHumanoidPose();
+  const turns = new Float64Array(bones.length * 4);
   for (let frame = 0; frame < frames; frame++) {
     toHumanoid(figure, poseAt(motion, frame, pose), humanoid);
     hips.set(humanoid.hips, frame * 3);
-    for (let bone = 0; bone < BONE_COUNT; bone++)
-      writeRotation(rotations[bone], frame * 4, humanoid.rotations, bone * 4);
+    const extendedPose = skeleton.extend(pose, extensionValuesAt(motion, frame));
+    if (extended && extendedPose) extended.rotations(extendedPose, turns);
+    else turns.set(humanoid.rotations);
+    for (let bone = 0; bone < bones.length; bone++) writeRotation(rotations[bone], frame * 4, turns, bone * 4);
     if (frame % FRAMES_PER_STEP === 0) yield frame / frames;
   }
   const times = asset.addAccessor(frameTimes(frames, fps), "SCALAR", { bounded: true });
@@ -45,7 +55,7 @@ export function* writeVrma(motion: SampledMotion, name: string): IncrementalTask
   asset.extraProperties.extensions = {
     [EXTENSION]: {
       specVersion: "1.0",
-      humanoid: { humanBones: Object.fromEntries(BONES.map((bone, node) => [bone, { node }])) },
+      humanoid: { humanBones: Object.fromEntries(bones.map((bone, node) => [bone, { node }])) },
     },
   };
   return asset.build([0], name);

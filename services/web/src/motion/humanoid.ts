@@ -45,7 +45,7 @@ const LEFT_ARM = JOINTS.indexOf("l_shoulder"),
   RIGHT_ARM = JOINTS.indexOf("r_shoulder");
 
 /** Rotation of each joint's bone from the T-pose to the figure's rest pose (72): for an arm, 90 degrees about z. */
-const T_POSE_TO_REST = new Float64Array(JOINT_COUNT * 4);
+export const T_POSE_TO_REST: Numbers = new Float64Array(JOINT_COUNT * 4);
 for (let joint = 0; joint < JOINT_COUNT; joint++) {
   T_POSE_TO_REST[joint * 4] = joint < LEFT_ARM ? 1 : Math.SQRT1_2;
   T_POSE_TO_REST[joint * 4 + 3] = joint < LEFT_ARM ? 0 : joint < RIGHT_ARM ? -Math.SQRT1_2 : Math.SQRT1_2;

@@ -2,7 +2,14 @@
 import { type AnimationClip, AnimationMixer, type Object3D, Vector3 } from "three";
 import { expect } from "vitest";
 import { MotionTrack } from "../../src/codec/motion-track";
-import { type IncrementalTask, poseAt, type SampledMotion, sampleMotion } from "../../src/export/sampled-motion";
+import {
+  extensionValuesAt,
+  type IncrementalTask,
+  poseAt,
+  type SampledMotion,
+  sampleMotion,
+} from "../../src/export/sampled-motion";
+import { createExtendedPose, extendPose } from "../../src/motion/extension";
 import { applyPlacement, type Placement, STAGE_CENTRE } from "../../src/motion/placement";
 import { fromRotationVector } from "../../src/motion/rotation";
 import {
@@ -14,6 +21,7 @@ import {
   worldTransforms,
 } from "../../src/motion/skeleton";
 import { MotionBlockStore } from "../../src/playout/block-store";
+import { extensionVectors, goldenExtensionTrack } from "../golden-extensions";
 import { type BlockVectors, goldenDescription } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 import { createStandardFigure } from "../stage/puppet/figures";
@@ -51,6 +59,21 @@ export function turningMotion({
   return motion;
 }
 
+/** Create a turning motion of the figure of golden extension `track`, whose trunk, neck and shoulders move too. */
+export function extendedMotion(track: number): SampledMotion {
+  const golden = extensionVectors();
+  const vector = golden.poses.find((pose) => pose.track === track) as (typeof golden.poses)[number];
+  const { extension } = goldenExtensionTrack(golden.tracks[track]);
+  const figure = { offsets: Float64Array.from(vector.offsets), tips: createStandardFigure().tips };
+  const motion = turningMotion({ straight: true, figure });
+  const size = extension.kinds.length * 3;
+  const values = Float64Array.from(
+    { length: motion.frames * size },
+    (_, at) => 0.15 * Math.sin(Math.floor(at / size) / 6 + (at % size)),
+  );
+  return { ...motion, extension: { extension, values } };
+}
+
 /** Return a golden motion at the best bitrate level of each block, at a placement. */
 export function goldenMotion(motionIndex = 0, { x, z, turn }: Placement = STAGE_CENTRE): SampledMotion {
   return runToCompletion(sampleMotion(goldenStore(motionIndex, { x, z, turn })));
@@ -84,13 +107,13 @@ export async function joinParts(parts: Uint8Array<ArrayBuffer>[]): Promise<Array
   return new Blob(parts).arrayBuffer();
 }
 
-/** Return the world positions of the joints in a frame (54) on the shared stage, in metres. */
+/** Return the world positions of the joints in a frame (54) on the shared stage, in metres, as an extension moves them. */
 export function jointPositions(motion: SampledMotion, frame: number): Float64Array {
-  return worldTransforms(
-    motion.figure,
-    applyPlacement(poseAt(motion, frame, restPose()), motion.placement),
-    createWorldTransforms(),
-  ).positions.slice();
+  const pose = applyPlacement(poseAt(motion, frame, restPose()), motion.placement);
+  const world = worldTransforms(motion.figure, pose, createWorldTransforms());
+  const values = extensionValuesAt(motion, frame);
+  if (!motion.extension || !values) return world.positions.slice();
+  return extendPose(motion.figure, world, values, createExtendedPose(motion.extension.extension)).positions.slice();
 }
 
 /**

@@ -8,7 +8,7 @@ import type { SampledMotion } from "../../src/export/sampled-motion";
 import { writeVrma } from "../../src/export/vrma";
 import { JOINTS } from "../../src/motion/skeleton";
 import { createPuppetModel } from "../../src/stage/puppet/puppet-model";
-import { goldenMotion, joinParts, jointPositions, runToCompletion, turningMotion } from "./motions";
+import { extendedMotion, goldenMotion, joinParts, jointPositions, runToCompletion, turningMotion } from "./motions";
 
 const REPOSITORY = resolve(import.meta.dirname, "../../../..");
 /** Largest mean distance of the joints, in millimetres. */
@@ -21,12 +21,16 @@ const LEFT_HIP = JOINTS.indexOf("l_hip");
 const PYTHON = `
 import json, sys
 from bunraku.motion.analysis import analyse
+from bunraku.motion.extension import extend_pose
 from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.skeleton import JOINTS, world_transforms
 analysis = analyse(read_motion(sys.stdin.buffer.read()))
 motion = analysis.motion
-positions, _ = world_transforms(motion.figure, motion.root, motion.rotations)
-result = {"fps": motion.fps, "profile": analysis.profile, "places": (positions - positions[0, JOINTS.index('l_hip')]).ravel().tolist()}
+positions, orientations = world_transforms(motion.figure, motion.root, motion.rotations)
+if analysis.extension is not None:
+    found = analysis.extension
+    positions = extend_pose(motion.figure, found.extension, positions, orientations, found.values).positions
+result = {"fps": motion.fps, "profile": analysis.profile, "extension": analysis.extension is not None, "places": (positions - positions[0, JOINTS.index('l_hip')]).ravel().tolist()}
 json.dump(result, sys.stdout)
 `;
 
@@ -35,7 +39,13 @@ const FORMATS = {
   GLB: (motion: SampledMotion) => writeGlb([{ motion, model: createPuppetModel(motion.figure) }], "dance", null),
   VRMA: (motion: SampledMotion) => writeVrma(motion, "dance"),
 };
-const MOTIONS = { turning: withStillPelvis(turningMotion()), golden: withStillPelvis(goldenMotion()) };
+const MOTIONS = {
+  turning: withStillPelvis(turningMotion()),
+  golden: withStillPelvis(goldenMotion()),
+  "extended (three joints of the spine)": extendedMotion(0),
+  "extended (no joint of the spine)": extendedMotion(1),
+  "extended (one joint of the spine)": extendedMotion(2),
+};
 
 /** Keep the sacroiliac in the frame of the root, from which the spine of a humanoid hangs in VRMA. */
 function withStillPelvis(motion: SampledMotion): SampledMotion {
@@ -53,8 +63,14 @@ for (const [format, write] of Object.entries(FORMATS)) {
       maxBuffer: 1e8,
     });
     expect(python.stderr.toString()).toBe("");
-    const result = JSON.parse(python.stdout.toString()) as { fps: number; profile: string; places: number[] };
+    const result = JSON.parse(python.stdout.toString()) as {
+      fps: number;
+      profile: string;
+      extension: boolean;
+      places: number[];
+    };
     expect(result.fps).toBeCloseTo(motion.fps, 3);
+    expect(result.extension).toBe(Boolean(motion.extension));
     expect(result.places.length).toBe(motion.frames * 54);
     const [x, y, z] = jointPositions(motion, 0).subarray(3 * LEFT_HIP);
     let sum = 0;
