@@ -17,16 +17,20 @@ from websockets.typing import Subprotocol
 from bunraku.client import Client, StreamEnded, Viewer
 from bunraku.codec.container import add_audio_track, pack_motion
 from bunraku.codec.container import unpack_motion as unpack_motion
+from bunraku.codec.extension_encoder import encode_extension
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
-from bunraku.motion.skeleton import joint_and_tip_positions
+from bunraku.motion.analysis import analyse
+from bunraku.motion.extension import ExtendedPose, extend_pose
+from bunraku.motion.skeleton import joint_and_tip_positions, world_transforms
 from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
 from tests.audio import decode_opus, find_onset, make_click
+from tests.motion.extended_source import extended_source
 from tests.patient_viewer import PatientViewer, watch_until
 from tests.servers import run_server
 from tests.time_limit import HANG_TIMEOUT_S
@@ -130,6 +134,33 @@ async def test_it_shows_camera_and_light_beside_the_dance(tmp_path: Path) -> Non
     assert viewer.scene_at(max(seen), 2) is None
     said = figures.as_json()["camera"]
     np.testing.assert_allclose([*said["position"], *said["gaze"], said["fov"]], last, atol=0.05)
+
+
+async def test_it_shows_the_joints_of_an_extension(tmp_path: Path) -> None:
+    analysis = analyse(extended_source(90))
+    assert analysis.extension is not None
+    motion, extension = analysis.motion, analysis.extension
+    encoded = encode_motion(motion, error_bounds_mm=(5.0,), grade="live")
+    extended = encode_extension(extension.extension, extension.values, encoded.track, error_bounds_mm=(5.0,))
+    packed = pack_motion("extended", encoded, extensions=[extended])
+    await MotionStore.open(f"file://{tmp_path}/library").put("extended", packed)
+    with run_server(tmp_path) as url:
+        viewer = Viewer(Client(url).socket_url("/v1/motions/extended/stream"))
+        seen: dict[int, ExtendedPose] = {}
+
+        def note(reference: int, _pose: Pose) -> None:
+            if (pose := viewer.extended_pose_at(reference)) is not None:
+                seen[reference] = pose
+
+        await watch_until(viewer, lambda: len(seen) >= 5, note)
+    state = viewer.timeline_history.newest
+    assert state is not None
+    placed = world_transforms(motion.figure, motion.root, motion.rotations)
+    truth = extend_pose(motion.figure, extension.extension, *placed, extension.values)
+    for reference, pose in seen.items():
+        frame = round(((reference - state.clock) % 3_000_000) * 30 / 1e6) % 90
+        np.testing.assert_allclose(pose.extra_positions[0], truth.extra_positions[frame], atol=0.08)
+    assert viewer.extended_pose_at(max(seen), 1) is None
 
 
 async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:
@@ -304,7 +335,7 @@ def test_of_a_performer_that_cannot_be_played_it_holds_nothing() -> None:
         for seed in (5, 6, 7)
     ]
     viewer = told([dances[0], dances[1] | {"codec": "bunraku.motion/9"}, dances[2]])
-    assert "?have=m.0.-.3.0..0.-&at=" in viewer._make_url()
+    assert "&have=m.0.-.3.0..0.-&at=" in viewer._make_url()
 
 
 async def test_of_a_paused_dance_the_best_of_every_performer_is_shown_soon(tmp_path: Path) -> None:

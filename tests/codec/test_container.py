@@ -16,13 +16,17 @@ from bunraku.codec.container import (
     unpack_motion,
 )
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension_encoder import encode_extension
+from bunraku.codec.extension_track import ExtensionTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
+from bunraku.motion.analysis import analyse
 from bunraku.motion.placement import Placement
 from bunraku.wire.messages import Data, Description, unpack
+from tests.motion.extended_source import extended_source
 from tests.vectors.audio import random_packets
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera, sample_light
@@ -165,3 +169,45 @@ def test_object_with_the_packets_of_one_track_is_read() -> None:
 def test_object_of_another_codec_is_refused() -> None:
     with pytest.raises(DamagedBlock, match=r"Unsupported motion codec 'bunraku\.motion/1'"):
         unpack_motion("m1", pack_motion("m1", ENCODED).replace(b"bunraku.motion/2", b"bunraku.motion/1"))
+
+
+ANALYSIS = analyse(extended_source(60))
+assert ANALYSIS.extension is not None
+EXTENDED = encode_motion(ANALYSIS.motion, error_bounds_mm=(30.0, 5.0), grade="live")
+EXTENSION = encode_extension(
+    ANALYSIS.extension.extension, ANALYSIS.extension.values, EXTENDED.track, error_bounds_mm=(30.0, 5.0)
+)
+
+
+def extended_motion(motion_id: str, *scenes: EncodedScene) -> StoredMotion:
+    return unpack_motion(motion_id, pack_motion(motion_id, EXTENDED, scenes, extensions=[EXTENSION]))
+
+
+def extended_performers(stored: StoredMotion) -> list[int]:
+    return [track.performer for track in stored.tracks if isinstance(track, ExtensionTrack)]
+
+
+def test_extension_comes_last_and_survives_other_changes() -> None:
+    stored = extended_motion("a", CAMERA)
+    assert [type(track).__name__ for track in stored.tracks] == ["MotionTrack", "SceneTrack", "ExtensionTrack"]
+    sung = unpack_motion("b", add_audio_track("b", stored, encoded_audio(stored, 2.0))[0])
+    assert isinstance(sung.tracks[-1], ExtensionTrack)
+    lit = unpack_motion("c", replace_scene_tracks("c", sung, [CAMERA, CAMERA], {"camera"})[0])
+    assert isinstance(lit.tracks[-1], ExtensionTrack)
+    last = len(lit.tracks) - 1
+    assert [data.block for data in data_messages(lit, last)] == [b for level in EXTENSION.ladder for b in level.blocks]
+
+
+def test_extensions_belong_to_their_performers() -> None:
+    stored, plain = extended_motion("a", CAMERA), pack_and_unpack("b")
+    placements = [Placement(float(x), 0.0, 0.0) for x in range(4)]
+    packed, types = add_performers("c", stored, [plain, extended_motion("d"), extended_motion("e")], placements)
+    assert types == ["motion"] * 4 + ["camera"] + ["extension"] * 3
+    assert extended_performers(unpack_motion("c", packed)) == [0, 2, 3]
+
+
+def test_extensions_without_a_track_number_are_left_out() -> None:
+    stored = extended_motion("a")
+    packed, types = replace_scene_tracks("b", stored, [CAMERA] * (MAX_TRACKS - 1), {"camera"})
+    assert len(types) == MAX_TRACKS
+    assert extended_performers(unpack_motion("b", packed)) == []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bunraku.motion import rotation
+from bunraku.motion.bvh_writer import euler_zxy
 from bunraku.motion.source_motion import EndSite, SampledMotion, chain_transforms
 
 _SIDE = {"Shoulder": (0.04, 0.1, 0.0), "Arm": (0.12, 0.02, 0.0), "ForeArm": (0.28, 0.0, 0.0), "Hand": (0.26, 0.0, 0.0)}
@@ -56,3 +57,39 @@ def extended_source(
         positions,
         orientations,
     )
+
+
+def write_source_bvh(source: SampledMotion) -> bytes:
+    """Return a source as BVH in centimetres."""
+    children = [
+        [child for child, parent in enumerate(source.parents) if parent == joint] for joint in range(len(source.names))
+    ]
+    lines, order = ["HIERARCHY"], []
+
+    def add(joint: int, depth: int) -> None:
+        order.append(joint)
+        parent = source.parents[joint]
+        offset = np.zeros(3) if parent < 0 else source.rest_positions[joint] - source.rest_positions[parent]
+        kind, channels = ("ROOT", "6 Xposition Yposition Zposition") if parent < 0 else ("JOINT", "3")
+        indent = "\t" * depth
+        lines.append(f"{indent}{kind} {source.names[joint]}\n{indent}{{")
+        lines.append(f"{indent}\tOFFSET " + " ".join(f"{100 * x:.6f}" for x in offset))
+        lines.append(f"{indent}\tCHANNELS {channels} Zrotation Xrotation Yrotation")
+        for child in children[joint]:
+            add(child, depth + 1)
+        if not children[joint]:
+            lines.append(f"{indent}\tEnd Site\n{indent}\t{{\n{indent}\t\tOFFSET 0 8 0\n{indent}\t}}")
+        lines.append(f"{indent}}}")
+
+    add(0, 0)
+    local = source.orientations.copy()
+    for joint, parent in enumerate(source.parents):
+        if parent >= 0:
+            local[:, joint] = rotation.multiply(
+                rotation.conjugate(source.orientations[:, parent]), source.orientations[:, joint]
+            )
+    angles = euler_zxy(local[:, order]).reshape(source.frame_count, -1)
+    rows = np.concatenate([100 * source.positions[:, 0], angles], axis=1)
+    lines += ["MOTION", f"Frames: {len(rows)}", f"Frame Time: {1 / source.fps:.9f}"]
+    lines += [" ".join(f"{value:.6f}" for value in row) for row in rows]
+    return "\n".join([*lines, ""]).encode()

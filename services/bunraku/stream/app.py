@@ -10,8 +10,8 @@ from fastapi import FastAPI, Query, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
 from bunraku.codec.container import StoredMotion
-from bunraku.delivery.resume import ResumeState
 from bunraku.codec.extension_track import EXTENSION_TYPE
+from bunraku.delivery.resume import ResumeState
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.problem_details import motion_not_found
@@ -103,7 +103,10 @@ def create_app(context: ServiceContext) -> FastAPI:
     ) -> None:
         try:
             options = ViewerOptions(
-                rate, _parse_track_types(tracks, extensions), has_own_timeline=True, resume_state=_parse_resume_state(have)
+                rate,
+                _parse_track_types(tracks, extensions),
+                has_own_timeline=True,
+                resume_state=_parse_resume_state(have),
             )
             viewer = ViewerConnection(stream, options)
             found = await context.motion_store.get(motion)

@@ -17,7 +17,7 @@ from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.wire.messages import Description, unpack
 
 TRACK_TYPES = ("motion", "audio", "camera", "light")
-"""Types of tracks that a viewer may request by name, and is sent by default. Extensions have a parameter of their own."""
+"""Types of tracks that a viewer may request by name, and is sent by default; extensions have their own parameter."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,8 +6,11 @@ import msgpack
 import numpy as np
 import pytest
 
+from bunraku.codec.container import unpack_motion
+from bunraku.codec.extension_track import ExtensionTrack
 from bunraku.ingest.jobs.motion import encode_file
 from bunraku.ingest.result import JobRejection, JobResult
+from tests.motion.extended_source import extended_source, write_source_bvh
 from tests.servers import make_bvh_clip
 
 
@@ -37,3 +40,17 @@ def test_invalid_file_is_rejected_with_a_hint(tmp_path: Path) -> None:
     assert isinstance(rejected, JobRejection)
     assert rejected.line is not None
     assert rejected.hint
+
+
+def test_source_with_clavicles_gets_an_extension_that_is_described(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(write_source_bvh(extended_source(60)))
+    result = encode_file("m1", source)
+    assert isinstance(result, JobResult)
+    assert result.description["tracks"] == ["motion", "extension"]
+    described = result.description["extension"]
+    assert described["joints"] == ["vl5", "vl1", "vt10", "vc4", "l_sternoclavicular", "r_sternoclavicular"]
+    assert described["fit"]["mean_mm"] < 1.5 < result.description["fit"]["mean_mm"]
+    stored = unpack_motion("m1", result.packed)
+    assert isinstance(stored.tracks[1], ExtensionTrack)
+    assert stored.tracks[1].block_count == stored.first_track.block_count

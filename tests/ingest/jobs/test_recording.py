@@ -4,15 +4,18 @@ import numpy as np
 
 from bunraku.codec import container
 from bunraku.codec.container import StoredMotion
+from bunraku.codec.extension_encoder import encode_extension
 from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.ingest.jobs.recording import encode_recording, sample_camera
-from bunraku.ingest.jobs.replay import SessionReplay
+from bunraku.ingest.jobs.replay import SessionReplay, extensions_of
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbInput
 from bunraku.messaging.recording_request import RecordingRequest, pack_camera
+from bunraku.motion.analysis import analyse
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore, SceneBlockStore
@@ -21,6 +24,7 @@ from bunraku.playout.session_log import SessionLog
 from bunraku.wire.messages import Data
 from bunraku.wire.overlay import Overlay
 from tests.ingest.jobs.motions import MOTIONS, PLACEMENTS, SECOND_US, START_CLOCK_US, make_log
+from tests.motion.extended_source import extended_source
 
 
 def load_blocks(name: str) -> MotionBlockStore:
@@ -212,3 +216,22 @@ def test_camera_is_constant_outside_its_keyframes() -> None:
     values = sample_camera(np.array(keys), [0, 10, 15, 20, 99]).values
     np.testing.assert_allclose(values[:, 0], [0, 0, 0.5, 1, 1])
     np.testing.assert_allclose(values[:, 6], [0.5, 0.5, 0.6, 0.7, 0.7])
+
+
+def test_recording_has_the_extension_as_it_was_shown() -> None:
+    analysis = analyse(extended_source(90))
+    assert analysis.extension is not None
+    encoded = encode_motion(analysis.motion, error_bounds_mm=(5.0,), grade="live")
+    extension = encode_extension(
+        analysis.extension.extension, analysis.extension.values, encoded.track, error_bounds_mm=(5.0,)
+    )
+    stored = container.unpack_motion("x", container.pack_motion("x", encoded, extensions=[extension]))
+    sought = timeline.start("x", 3 * SECOND_US, START_CLOCK_US, position=SECOND_US)
+    request = RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + SECOND_US)
+    motion, _ = unpack_recording(encode_recording("recorded", request, make_log(sought), {"x": stored}))
+    (original,), (recorded,) = extensions_of(stored), extensions_of(motion)
+    played = timeline.start("recorded", SECOND_US, START_CLOCK_US)
+    for frame in range(60):
+        clock = START_CLOCK_US + round(frame * 1e6 / 60)
+        apart = recorded.values_at(played, clock) - original.values_at(sought, clock)
+        assert np.abs(apart).max() < 0.02

@@ -8,10 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from bunraku.codec.container import StoredMotion, pack_motion
+from bunraku.codec.extension_encoder import EncodedExtension, encode_extension
+from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_motions
-from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay
+from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay, extensions_of
 from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
 from bunraku.motion.rotation import Array
@@ -62,15 +64,35 @@ def encode_recording(
         replace(each, front=performer.front, placement=performer.placement)
         for performer, each in zip(played.performers, encode_motions(recorded, on_progress), strict=True)
     ]
+    extensions = _record_extensions(session, played, times, [each.track for each in (encoded, *others)])
     return JobResult(
-        pack_motion(motion_id, encoded, scenes, others),
+        pack_motion(motion_id, encoded, scenes, others, extensions),
         {
             **describe_encoding(recorded[0], encoded),
-            "tracks": [*(["motion"] * len(recorded)), *(scene.track.kind for scene in scenes)],
+            "tracks": [
+                *(["motion"] * len(recorded)),
+                *(scene.track.kind for scene in scenes),
+                *(each.track.kind for each in extensions),
+            ],
             **({"performers": len(recorded)} if others else {}),
             "kept_from": played.id,
         },
     )
+
+
+def _record_extensions(
+    session: SessionReplay, played: StoredMotion, times: Sequence[int], tracks: Sequence[MotionTrack]
+) -> list[EncodedExtension]:
+    """Encode the extensions of the played motion as they were shown; `tracks` are the recorded performers."""
+    states = [session.timeline_at(time) for time in times]
+    encoded = []
+    for extension in extensions_of(played):
+        performer = extension.track.performer
+        shown = [
+            extension.values_at(state, time) for state, time in zip(states, times, strict=True) if state is not None
+        ]
+        encoded.append(encode_extension(extension.track.extension, np.stack(shown), tracks[performer], performer))
+    return encoded
 
 
 def sample_camera(keys: Array, times: Sequence[int]) -> SceneSamples:

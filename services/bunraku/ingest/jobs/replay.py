@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import contextlib
 from bisect import bisect_right
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from bunraku.codec.container import PerformerTracks, StoredMotion
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension_track import ExtensionTrack, decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
-from bunraku.playout.block_store import MotionBlockStore, Pose
+from bunraku.motion.rotation import Array
+from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, Pose
 from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US, OverlayBuffer
 from bunraku.playout.session_log import SessionLog
@@ -97,6 +99,35 @@ class SessionReplay:
         if motion not in self._performers_by_motion:
             raise MissingMotion(f"the motion {motion} was removed from the library")
         return self._performers_by_motion[motion]
+
+
+class ExtensionPlayback:
+    """Extension of a performer at the highest bitrate level, decoded on demand."""
+
+    def __init__(self, track: ExtensionTrack, packets: Sequence[bytes]) -> None:
+        self.track, self._packets = track, packets
+        self._store = ExtensionBlockStore(track)
+
+    def values_at(self, state: TimelineState, clock: int) -> Array:
+        """Return the values (E, 3) that a timeline shows at a clock time."""
+        position = position_at(state, clock)
+        index = self.track.block_at(position)
+        for needed in (index, (index + 1) % self.track.block_count):
+            if self._store.level(needed) < 0:
+                packet = Data.unpack(self._packets[needed])
+                self._store.put(needed, packet.rate, decode_extension_block(self.track, packet.block))
+        values = self._store.values_at(position, state.loop, state.duration)
+        assert values is not None, "every block is stored"
+        return values
+
+
+def extensions_of(motion: StoredMotion) -> list[ExtensionPlayback]:
+    """Return the extensions of a motion's performers."""
+    return [
+        ExtensionPlayback(track, packets[-1])
+        for track, packets in zip(motion.tracks, motion.packets, strict=True)
+        if isinstance(track, ExtensionTrack)
+    ]
 
 
 class _PerformerPlayback:
