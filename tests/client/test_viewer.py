@@ -141,7 +141,7 @@ async def test_it_shows_the_joints_of_an_extension(tmp_path: Path) -> None:
     assert analysis.extension is not None
     motion, extension = analysis.motion, analysis.extension
     encoded = encode_motion(motion, error_bounds_mm=(5.0,), grade="live")
-    extended = encode_extension(extension.extension, extension.values, encoded.track, error_bounds_mm=(5.0,))
+    extended = encode_extension(extension.extension, extension.values, encoded.track, [1.5])
     packed = pack_motion("extended", encoded, extensions=[extended])
     await MotionStore.open(f"file://{tmp_path}/library").put("extended", packed)
     with run_server(tmp_path) as url:

@@ -174,9 +174,7 @@ def test_object_of_another_codec_is_refused() -> None:
 ANALYSIS = analyse(extended_source(60))
 assert ANALYSIS.extension is not None
 EXTENDED = encode_motion(ANALYSIS.motion, error_bounds_mm=(30.0, 5.0), grade="live")
-EXTENSION = encode_extension(
-    ANALYSIS.extension.extension, ANALYSIS.extension.values, EXTENDED.track, error_bounds_mm=(30.0, 5.0)
-)
+EXTENSION = encode_extension(ANALYSIS.extension.extension, ANALYSIS.extension.values, EXTENDED.track, [9.0, 1.5])
 
 
 def extended_motion(motion_id: str, *scenes: EncodedScene) -> StoredMotion:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import decode_extension_block
-from bunraku.codec.motion_encoder import ERROR_BOUNDS_MM, encode_motion
+from bunraku.codec.extension_track import decode_extension_block, pack_extension
+from bunraku.codec.motion_encoder import encode_motion
 from bunraku.motion.analysis import analyse
 from bunraku.motion.extension import extend_pose
 from bunraku.motion.skeleton import world_transforms
@@ -15,20 +15,22 @@ ANALYSIS = analyse(extended_source(150, swing=0.4))
 assert ANALYSIS.extension is not None
 EXTENSION, VALUES = ANALYSIS.extension.extension, ANALYSIS.extension.values
 MOTION = encode_motion(ANALYSIS.motion, first_seconds=0.5, grade="live")
-ENCODED = encode_extension(EXTENSION, VALUES, MOTION.track)
+ENCODED = encode_extension(EXTENSION, VALUES, MOTION.track, [level.mean_error_mm for level in MOTION.ladder])
 
 
 def test_levels_grow_and_share_the_blocks_of_the_motion() -> None:
-    assert len(ENCODED.ladder) == len(MOTION.ladder) == len(ERROR_BOUNDS_MM)
     assert all(len(level.blocks) == MOTION.track.block_count for level in ENCODED.ladder)
     rates = [level.kbps for level in ENCODED.ladder]
     assert rates == sorted(rates)
-    for level, bound in zip(ENCODED.ladder, ERROR_BOUNDS_MM, strict=True):
-        assert level.max_error_mm <= level.error_bound_mm < bound
+    errors = [level.mean_error_mm for level in ENCODED.ladder]
+    assert errors == sorted(errors, reverse=True)
+    for level, motion_level in zip(ENCODED.ladder, MOTION.ladder, strict=True):
+        assert level.mean_error_mm < 1.5 * motion_level.mean_error_mm
+        assert level.max_error_mm <= level.error_bound_mm + 1e-3
 
 
-@pytest.mark.parametrize("level", [2, 4])
-def test_decoded_joints_are_near_those_of_the_source(level: int) -> None:
+@pytest.mark.parametrize("level", range(5))
+def test_decoded_joints_are_as_near_as_those_of_the_motion(level: int) -> None:
     track, motion = ENCODED.track, ANALYSIS.motion
     values = np.concatenate(
         [
@@ -40,10 +42,14 @@ def test_decoded_joints_are_near_those_of_the_source(level: int) -> None:
     truth = extend_pose(motion.figure, EXTENSION, *placed, VALUES)
     decoded = extend_pose(motion.figure, EXTENSION, *placed, values)
     apart = 1e3 * np.linalg.norm(decoded.extra_positions - truth.extra_positions, axis=-1)
-    assert apart.max() <= 2 * ERROR_BOUNDS_MM[level]
-    assert apart.mean() <= 0.5 * ERROR_BOUNDS_MM[level]
+    assert apart.mean() <= 1.5 * MOTION.ladder[level].mean_error_mm
 
 
-def test_bound_that_cannot_be_met_is_an_error() -> None:
-    with pytest.raises(ValueError, match="finest step"):
-        encode_extension(EXTENSION, VALUES, MOTION.track, error_bounds_mm=(1e-9,))
+def test_extension_costs_a_quarter_of_the_motion_at_most() -> None:
+    added = sum(map(len, ENCODED.ladder[2].blocks)) + len(pack_extension(EXTENSION))
+    assert added <= 0.4 * sum(map(len, MOTION.ladder[2].blocks))
+
+
+def test_values_that_are_too_large_are_an_error() -> None:
+    with pytest.raises(ValueError, match="too large"):
+        encode_extension(EXTENSION, VALUES * 1e9, MOTION.track, [0.01])

@@ -24,7 +24,7 @@ ANALYSIS = analyse(extended_source())
 assert ANALYSIS.extension is not None
 EXTENSION = ANALYSIS.extension.extension
 TRACK = ExtensionTrack(30.0, 120, 30, 15, 0, EXTENSION)
-ENCODED = encode_extension(EXTENSION, ANALYSIS.extension.values, TRACK)
+ENCODED = encode_extension(EXTENSION, ANALYSIS.extension.values, TRACK, [4.0, 0.5])
 
 
 def test_description_round_trips() -> None:
@@ -45,9 +45,10 @@ def test_description_round_trips() -> None:
         {"joints": "text"},
         {"joints": b""},
         {"joints": bytes([0]) + bytes(18)},
-        {"joints": bytes([7]) + bytes(7 * 21 + 18)},
-        {"joints": bytes([33]) + bytes(21 + 18)},
-        {"joints": pack_extension(EXTENSION)[:-1]},
+        {"joints": bytes([5]) + bytes(18)},
+        {"joints": bytes([33]) + bytes(18)},
+        {"joints": pack_extension(EXTENSION) + bytes(512)},
+        {"joints": pack_extension(EXTENSION)[:1] + bytes(40)},
         {"frames": 0},
     ],
 )

@@ -51,7 +51,7 @@ def pose_vectors(number: int, spine_count: int, neck_count: int) -> tuple[dict[s
     assert analysis.extension is not None
     motion, extension = analysis.motion, analysis.extension.extension
     timing = plan_timing(motion.fps, motion.frame_count)
-    encoded = encode_extension(extension, analysis.extension.values, timing, number, (20.0, 1.0))
+    encoded = encode_extension(extension, analysis.extension.values, timing, (6.0, 0.3), number)
     frames = [0, 13, 39]
     placed = world_transforms(motion.figure, motion.root[frames], motion.rotations[frames])
     values = analysis.extension.values[frames]
@@ -96,11 +96,11 @@ def make_vectors() -> dict[str, Any]:
         "another codec": {"codec": "bunraku.extension/9"},
         "another part": {"part": "tail"},
         "negative performer": {"performer": -1},
-        "five joints of the spine": {"joints": to_base64(bytes([5]) + bytes(5 * 21 + 18))},
+        "five joints of the spine": {"joints": to_base64(bytes([5]) + bytes(30))},
         "no joint": {"joints": to_base64(bytes(19))},
-        "an unknown flag": {"joints": to_base64(bytes([33]) + bytes(21 + 18))},
-        "too short": {"joints": to_base64(joints[:-1])},
-        "too long": {"joints": to_base64(joints + b"\0")},
+        "an unknown flag": {"joints": to_base64(bytes([33]) + bytes(30))},
+        "an integer too large": {"joints": to_base64(joints[:1] + bytes(40))},
+        "too long": {"joints": to_base64(joints + bytes(512))},
     }
     return {
         "tracks": [{key: value for key, value in description.items() if key != "blocks"} for description, _ in made],

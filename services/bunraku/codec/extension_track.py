@@ -5,7 +5,6 @@ proto/codec.md, 2.17, is the definition.
 
 from __future__ import annotations
 
-import struct
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +13,7 @@ import numpy as np
 from bunraku.codec import coefficients, transform
 from bunraku.codec.channel_layout import NONE, ChannelLayout, create_layout
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.integer_coder import decode_integers, encode_integers
 from bunraku.codec.motion_decoder import reconstruct
 from bunraku.codec.motion_track import step_size
 from bunraku.codec.prior import IntArray, Prior, load_shipped_prior
@@ -43,8 +43,9 @@ _PRIOR_CHANNELS = {
 }
 """Channels of a motion whose biases the prior applies to an extension's joints."""
 _NECK_BIT, _CLAVICLES_BIT = 8, 16
-_JOINT = struct.Struct("<3h3h9b")
-_END = struct.Struct("<3h")
+_ROW = 15
+"""Integers of a joint: offset, rest and drive."""
+MAX_EXTENSION_BYTES = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,10 +129,13 @@ def pack_extension(extension: BodyExtension) -> bytes:
     """Return the bytes of `joints` that describe an extension."""
     flags = extension.spine_count | _NECK_BIT * extension.has_neck | _CLAVICLES_BIT * extension.has_clavicles
     joints = [
-        _JOINT.pack(*_integers(offset, LENGTH_UNIT_M), *_integers(rest, REST_UNIT_RAD), *_integers(drive, DRIVE_UNIT))
-        for offset, rest, drive in zip(extension.offsets, extension.rest, extension.drive, strict=True)
+        extension.offsets / LENGTH_UNIT_M,
+        extension.rest / REST_UNIT_RAD,
+        extension.drive.reshape(-1, 9) / DRIVE_UNIT,
     ]
-    return bytes([flags]) + b"".join(joints) + b"".join(_END.pack(*_integers(e, LENGTH_UNIT_M)) for e in extension.ends)
+    numbers = np.concatenate([np.concatenate(joints, axis=1).ravel(), extension.ends.ravel() / LENGTH_UNIT_M])
+    groups, mirrors = _integer_models(len(extension.offsets), extension.has_clavicles)
+    return bytes([flags]) + encode_integers(np.round(numbers).astype(np.int64), groups, mirrors)
 
 
 def unpack_extension(data: bytes) -> BodyExtension:
@@ -139,28 +143,39 @@ def unpack_extension(data: bytes) -> BodyExtension:
     flags = data[0] if data else 0
     spine_count, has_neck, has_clavicles = flags & 7, bool(flags & _NECK_BIT), bool(flags & _CLAVICLES_BIT)
     count = spine_count + has_neck + 2 * has_clavicles
-    expected = 1 + count * _JOINT.size + 3 * _END.size
-    if spine_count > MAX_SPINE_JOINTS or count == 0 or flags >> 5 or len(data) != expected:
+    if spine_count > MAX_SPINE_JOINTS or count == 0 or flags >> 5 or len(data) > MAX_EXTENSION_BYTES:
         raise DamagedBlock(
-            f"Invalid extension: its first byte is {flags} and it has {len(data)} bytes, expected {expected} bytes and "
-            f"1..{MAX_SPINE_JOINTS} joints of the spine, a neck or clavicles."
+            f"Invalid extension: its first byte is {flags} and it has {len(data)} bytes, expected a neck, clavicles or "
+            f"1..{MAX_SPINE_JOINTS} joints of the spine, and at most {MAX_EXTENSION_BYTES} bytes."
         )
-    joints = [_JOINT.unpack_from(data, 1 + index * _JOINT.size) for index in range(count)]
-    ends = [_END.unpack_from(data, 1 + count * _JOINT.size + index * _END.size) for index in range(3)]
-    numbers = np.array(joints, dtype=np.float64)
+    integers = decode_integers(data[1:], *_integer_models(count, has_clavicles)).astype(np.float64)
+    joints = integers[: count * _ROW].reshape(count, _ROW)
     return BodyExtension(
         spine_count,
         has_neck,
         has_clavicles,
-        offsets=numbers[:, :3] * LENGTH_UNIT_M,
-        ends=np.array(ends, dtype=np.float64) * LENGTH_UNIT_M,
-        drive=numbers[:, 6:].reshape(-1, 3, 3) * DRIVE_UNIT,
-        rest=numbers[:, 3:6] * REST_UNIT_RAD,
+        offsets=joints[:, :3] * LENGTH_UNIT_M,
+        ends=integers[count * _ROW :].reshape(3, 3) * LENGTH_UNIT_M,
+        drive=joints[:, 6:].reshape(-1, 3, 3) * DRIVE_UNIT,
+        rest=joints[:, 3:6] * REST_UNIT_RAD,
     )
 
 
-def _integers(values: Array, unit: float) -> list[int]:
-    return [round(float(value) / unit) for value in values.ravel()]
+def _integer_models(count: int, has_clavicles: bool) -> tuple[IntArray, IntArray]:
+    """Return the group of models of each integer that describes `count` joints, and the integer that it mirrors.
+
+    Groups are lengths by axis (0-2), rests (3), the diagonals of drives (4), their other elements (5), mirrored lengths
+    (6), and other mirrored integers (7).
+    """
+    joint = [0, 1, 2, 3, 3, 3, *(4 if row == column else 5 for row in range(3) for column in range(3))]
+    groups, mirrors = joint * count + [0, 1, 2] * 3, [-1] * (count * _ROW + 9)
+    right_shoulder = range(count * _ROW + 6, count * _ROW + 9)
+    right_clavicle = range((count - 1) * _ROW, count * _ROW) if has_clavicles else range(0)
+    for twins, distance in ((right_clavicle, _ROW), (right_shoulder, 3)):
+        for index in twins:
+            mirrors[index] = index - distance
+            groups[index] = 6 if groups[index] < 3 else 7
+    return np.array(groups, dtype=np.int64), np.array(mirrors, dtype=np.int64)
 
 
 def _create_extension_layout(kinds: list[JointKind]) -> ChannelLayout:

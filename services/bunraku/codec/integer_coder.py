@@ -91,7 +91,7 @@ def decode_integers(data: bytes, model_groups: IntArray, mirror_of: IntArray) ->
     values = _code_integers(_RangeDecoder(data), [0] * len(model_groups), model_groups, mirror_of, decoding=True)
     if values is None:
         raise DamagedBlock(
-            f"Invalid skeleton description: an integer has {INTEGER_BITS_LIMIT} or more bits, or a negative magnitude."
+            f"Invalid description: an integer has {INTEGER_BITS_LIMIT} or more bits, or a negative magnitude."
         )
     return np.array(values, dtype=np.int64)
 

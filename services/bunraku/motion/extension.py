@@ -31,9 +31,9 @@ SPINE_NAMES: tuple[tuple[str, ...], ...] = (
 """Names of the spine's joints, by their number; with any, they take the place of the figure's own vl5."""
 NECK_NAME = "vc4"
 CLAVICLE_NAMES = "l_sternoclavicular", "r_sternoclavicular"
-LENGTH_UNIT_M = 1e-4
-DRIVE_UNIT = 2.0**-6
-REST_UNIT_RAD = 2.0**-12
+LENGTH_UNIT_M = 5e-4
+DRIVE_UNIT = 2.0**-5
+REST_UNIT_RAD = 2.0**-9
 """Units of the integers that describe an extension."""
 
 _ROOT, _VL5, _HEAD = 0, JOINT_INDEX["vl5"], JOINT_INDEX["skullbase"]

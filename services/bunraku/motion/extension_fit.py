@@ -32,7 +32,9 @@ MIN_IMPROVEMENT_MM = 1.0
 _HEAD = JOINT_INDEX["skullbase"]
 _SHOULDERS = JOINT_INDEX["l_shoulder"], JOINT_INDEX["r_shoulder"]
 _RIDGE = 1e-3
-"""Weight of the drive's own size in its fit, per frame: directions that the source never takes have no effect."""
+"""Weight, per frame, of the drive's distance from the usual share: it decides where the driver does not move."""
+NECK_SHARE = 0.5
+"""Share of the head's rotation with which a neck usually turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +112,8 @@ class _ExtensionFit:
             driver = find_driver(
                 kind, self._fit.joint_positions, self._fit.joint_orientations, self._chest_before(kind, orientation)
             )
-            drive, rest, value = _fit_drive(
-                driver, rotation.to_rotation_vector(rotation.multiply(rotation.conjugate(parent), orientation))
-            )
+            turn = rotation.to_rotation_vector(rotation.multiply(rotation.conjugate(parent), orientation))
+            drive, rest, value = _fit_drive(driver, turn, self._usual_share(index))
             offsets.append(offset)
             drives.append(drive)
             rests.append(rest)
@@ -128,6 +129,13 @@ class _ExtensionFit:
             rest=np.array(rests),
         )
         return ExtensionMotion(extension, np.stack(values, axis=1), tuple(source for _, source in self._sources))
+
+    def _usual_share(self, index: int) -> float:
+        """Return the share of its driver with which a joint usually turns."""
+        kind = self._sources[index][0]
+        if kind is JointKind.SPINE:
+            return (index + 1) / sum(each is JointKind.SPINE for each, _ in self._sources)
+        return NECK_SHARE if kind is JointKind.NECK else 0.0
 
     def _chest_before(self, kind: JointKind, orientation: Array) -> Array:
         """Return the chest's orientation that the driver of a joint is relative to."""
@@ -171,11 +179,17 @@ class _ExtensionFit:
         return _round_lengths(mean_local_positions(frame, (target - start)[:, None])[0])
 
 
-def _fit_drive(driver: Array, turn: Array) -> tuple[Array, Array, Array]:
-    """Return the drive (3, 3) and rest (3,) with which a driver (n, 3) gives rotation vectors (n, 3), and the rest."""
+def _fit_drive(driver: Array, turn: Array, usual_share: float) -> tuple[Array, Array, Array]:
+    """Return the drive (3, 3) and rest (3,) with which a driver (n, 3) gives rotation vectors (n, 3), and the rest.
+
+    Where the driver does not move, the drive is the usual share: it then carries the decoder's errors of the figure in
+    the way in which the figure compensates them.
+    """
+    usual = usual_share * np.eye(3)
     centred, mean = driver - driver.mean(axis=0), turn.mean(axis=0)
     ridge = _RIDGE * len(driver) * np.eye(3)
-    drive = np.linalg.solve(centred.T @ centred + ridge, centred.T @ (turn - mean)).T
+    unexplained = turn - mean - centred @ usual
+    drive = usual + np.linalg.solve(centred.T @ centred + ridge, centred.T @ unexplained).T
     drive = np.clip(np.round(drive / DRIVE_UNIT), -MAX_DRIVE, MAX_DRIVE) * DRIVE_UNIT
     rest = np.round((mean - drive @ driver.mean(axis=0)) / REST_UNIT_RAD) * REST_UNIT_RAD
     return drive, rest, turn - driver @ drive.T - rest

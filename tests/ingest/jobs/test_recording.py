@@ -222,9 +222,7 @@ def test_recording_has_the_extension_as_it_was_shown() -> None:
     analysis = analyse(extended_source(90))
     assert analysis.extension is not None
     encoded = encode_motion(analysis.motion, error_bounds_mm=(5.0,), grade="live")
-    extension = encode_extension(
-        analysis.extension.extension, analysis.extension.values, encoded.track, error_bounds_mm=(5.0,)
-    )
+    extension = encode_extension(analysis.extension.extension, analysis.extension.values, encoded.track, [1.5])
     stored = container.unpack_motion("x", container.pack_motion("x", encoded, extensions=[extension]))
     sought = timeline.start("x", 3 * SECOND_US, START_CLOCK_US, position=SECOND_US)
     request = RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + SECOND_US)

@@ -42,7 +42,10 @@ def encode_file(
     on_progress(0.0)
     (encoded,) = encode_motions([analysis.motion], on_progress)
     extension = analysis.extension
-    extensions = [] if extension is None else [encode_extension(extension.extension, extension.values, encoded.track)]
+    extensions = []
+    if extension is not None:
+        mean_errors_mm = [level.mean_error_mm for level in encoded.ladder]
+        extensions = [encode_extension(extension.extension, extension.values, encoded.track, mean_errors_mm)]
     return JobResult(
         pack_motion(motion_id, encoded, extensions=extensions),
         {

@@ -9,7 +9,7 @@ import numpy as np
 
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.extension_encoder import EncodedExtension, encode_extension
-from bunraku.codec.motion_track import MotionTrack
+from bunraku.codec.motion_encoder import EncodedMotion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
 from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_motions
@@ -64,7 +64,7 @@ def encode_recording(
         replace(each, front=performer.front, placement=performer.placement)
         for performer, each in zip(played.performers, encode_motions(recorded, on_progress), strict=True)
     ]
-    extensions = _record_extensions(session, played, times, [each.track for each in (encoded, *others)])
+    extensions = _record_extensions(session, played, times, [encoded, *others])
     return JobResult(
         pack_motion(motion_id, encoded, scenes, others, extensions),
         {
@@ -81,9 +81,9 @@ def encode_recording(
 
 
 def _record_extensions(
-    session: SessionReplay, played: StoredMotion, times: Sequence[int], tracks: Sequence[MotionTrack]
+    session: SessionReplay, played: StoredMotion, times: Sequence[int], recorded: Sequence[EncodedMotion]
 ) -> list[EncodedExtension]:
-    """Encode the extensions of the played motion as they were shown; `tracks` are the recorded performers."""
+    """Encode the extensions of the played motion as they were shown; `recorded` are its performers."""
     states = [session.timeline_at(time) for time in times]
     encoded = []
     for extension in extensions_of(played):
@@ -91,7 +91,10 @@ def _record_extensions(
         shown = [
             extension.values_at(state, time) for state, time in zip(states, times, strict=True) if state is not None
         ]
-        encoded.append(encode_extension(extension.track.extension, np.stack(shown), tracks[performer], performer))
+        motion = recorded[performer]
+        mean_errors_mm = [level.mean_error_mm for level in motion.ladder]
+        values = np.stack(shown)
+        encoded.append(encode_extension(extension.track.extension, values, motion.track, mean_errors_mm, performer))
     return encoded
 
 

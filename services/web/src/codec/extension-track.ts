@@ -9,6 +9,7 @@ import { length } from "../motion/vector";
 import { type ChannelLayout, createLayout } from "./channel-layout";
 import { decodeCoefficients } from "./coefficients";
 import { DamagedBlock } from "./errors";
+import { decodeIntegers } from "./integer-coder";
 import { reconstruct, stepSize } from "./motion-decoder";
 import { loadShippedPrior, type Prior } from "./prior";
 import { MAX_BLOCK_FRAMES, parseTiming, Timing, type TrackDescription } from "./timing";
@@ -18,13 +19,14 @@ export const EXTENSION_CODEC = "bunraku.extension/1";
 const BODY_PART = "body";
 
 /** Units of the integers that describe an extension. */
-const LENGTH_UNIT_M = 1e-4;
-const DRIVE_UNIT = 2 ** -6;
-const REST_UNIT_RAD = 2 ** -12;
+const LENGTH_UNIT_M = 5e-4;
+const DRIVE_UNIT = 2 ** -5;
+const REST_UNIT_RAD = 2 ** -9;
 const NECK_BIT = 8;
 const CLAVICLES_BIT = 16;
-const JOINT_BYTES = 21;
-const END_BYTES = 6;
+/** Integers of a joint: offset, rest and drive. */
+const ROW = 15;
+const MAX_EXTENSION_BYTES = 512;
 
 /** Lever arm about a bone, for what turns with it, in metres. */
 const TWIST_RADIUS_M = 0.04;
@@ -80,27 +82,44 @@ export function unpackExtension(data: Uint8Array): BodyExtension {
   const spineCount = flags & 7;
   const kinds = extensionKinds(spineCount, (flags & NECK_BIT) !== 0, (flags & CLAVICLES_BIT) !== 0);
   const count = kinds.length;
-  const expected = 1 + count * JOINT_BYTES + 3 * END_BYTES;
-  if (spineCount >= SPINE_NAMES.length || count === 0 || flags >> 5 || data.length !== expected) {
+  if (spineCount >= SPINE_NAMES.length || count === 0 || flags >> 5 || data.length > MAX_EXTENSION_BYTES) {
     throw new DamagedBlock(
-      `Invalid extension: its first byte is ${flags} and it has ${data.length} bytes, expected ${expected} bytes and ` +
-        `1..${SPINE_NAMES.length - 1} joints of the spine, a neck or clavicles.`,
+      `Invalid extension: its first byte is ${flags} and it has ${data.length} bytes, expected ` +
+        `1..${SPINE_NAMES.length - 1} joints of the spine, a neck or clavicles, and at most ${MAX_EXTENSION_BYTES} bytes.`,
     );
   }
-  const view = new DataView(data.buffer, data.byteOffset, data.length);
-  const integers = (at: number, size: number, unit: number) =>
-    Array.from({ length: size }, (_, i) => view.getInt16(at + 2 * i, true) * unit);
-  const joints = kinds.map((_, joint) => 1 + joint * JOINT_BYTES);
+  const integers = decodeIntegers(data.subarray(1), ...integerModels(kinds));
+  const column = (from: number, size: number, unit: number) =>
+    Float64Array.from(
+      { length: count * size },
+      (_, at) => integers[Math.floor(at / size) * ROW + from + (at % size)] * unit,
+    );
   return {
     kinds,
     names: extensionNames(kinds),
-    offsets: Float64Array.from(joints.flatMap((at) => integers(at, 3, LENGTH_UNIT_M))),
-    rest: Float64Array.from(joints.flatMap((at) => integers(at + 6, 3, REST_UNIT_RAD))),
-    drive: Float64Array.from(
-      joints.flatMap((at) => Array.from({ length: 9 }, (_, i) => view.getInt8(at + 12 + i) * DRIVE_UNIT)),
-    ),
-    ends: Float64Array.from(integers(1 + count * JOINT_BYTES, 9, LENGTH_UNIT_M)),
+    offsets: column(0, 3, LENGTH_UNIT_M),
+    rest: column(3, 3, REST_UNIT_RAD),
+    drive: column(6, 9, DRIVE_UNIT),
+    ends: integers.subarray(count * ROW).map((value) => value * LENGTH_UNIT_M),
   };
+}
+
+/**
+ * Returns the group of models of each integer that describes an extension, and the integer that it mirrors. Groups are
+ * lengths by axis (0-2), rests (3), the diagonals of drives (4), their other elements (5), mirrored lengths (6), and other
+ * mirrored integers (7).
+ */
+function integerModels(kinds: readonly JointKind[]): [groups: number[], mirrors: number[]] {
+  const count = kinds.length;
+  const joint = [0, 1, 2, 3, 3, 3, 4, 5, 5, 5, 4, 5, 5, 5, 4];
+  const groups = [...kinds.flatMap(() => joint), 0, 1, 2, 0, 1, 2, 0, 1, 2];
+  const mirrors = groups.map((group, index) => {
+    const isClavicle = kinds.at(-1) === "right clavicle" && index >= (count - 1) * ROW && index < count * ROW;
+    const distance = isClavicle ? ROW : index >= count * ROW + 6 ? 3 : 0;
+    if (distance > 0) groups[index] = group < 3 ? 6 : 7;
+    return distance > 0 ? index - distance : -1;
+  });
+  return [groups, mirrors];
 }
 
 /** A decoded block. */

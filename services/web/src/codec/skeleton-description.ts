@@ -8,7 +8,7 @@
 import { fromRotationVector } from "../motion/rotation";
 import { type Figure, JOINT_COUNT, JOINTS, TIP_JOINTS } from "../motion/skeleton";
 import { DamagedBlock } from "./errors";
-import { HALF_PROBABILITY, RangeDecoder } from "./range-coder";
+import { decodeIntegers } from "./integer-coder";
 
 /** Unit of a figure's integers at grid 0, metres. Each grid is twice as coarse as the one before. */
 const FINEST_GRID_M = 1e-4;
@@ -16,11 +16,6 @@ const MAX_GRID = 7;
 /** Limit of the fractional bits of a reference in radians. */
 const MAX_REFERENCE_BITS = 14;
 const MAX_SKELETON_BYTES = 1024;
-
-/** The bit length of a coded magnitude plus one, minus one, is below this. */
-const INTEGER_BITS_LIMIT = 17;
-/** Initial probability of one more bit: 0.7, in 1/32768. */
-const INITIAL_LENGTH_PROBABILITY = 22938;
 
 const LENGTH_ROWS = JOINT_COUNT + TIP_JOINTS.length;
 const NAMES = [...JOINTS, ...TIP_JOINTS.map((joint) => `${JOINTS[joint]} tip`)];
@@ -61,7 +56,7 @@ export function unpackSkeletonDescription(data: Uint8Array): SkeletonDescription
         `${bits} reference bits, at most ${MAX_REFERENCE_BITS}.`,
     );
   }
-  const integers = decodeIntegers(data.subarray(1));
+  const integers = decodeIntegers(data.subarray(1), MODEL_GROUPS, MIRROR_OF);
   const unit = FINEST_GRID_M * 2 ** grid;
   const figure = { offsets: new Float64Array(JOINT_COUNT * 3), tips: new Float64Array(JOINT_COUNT * 3) };
   for (let i = 0; i < JOINT_COUNT * 3; i++) figure.offsets[i] = integers[i] * unit;
@@ -75,38 +70,4 @@ export function unpackSkeletonDescription(data: Uint8Array): SkeletonDescription
     fromRotationVector(reference, joint * 4, x, y, z);
   }
   return { figure, reference };
-}
-
-/**
- * Decodes the integers of a description. Each is its magnitude plus one, the bit length minus one in unary with the
- * adaptive models of its group, then the low bits, then the sign. A mirrored one is the difference of its magnitude
- * from that of the earlier integer, coded alike, then whether the signs differ.
- */
-function decodeIntegers(data: Uint8Array): Float64Array {
-  const decoder = new RangeDecoder(data);
-  const groups = Math.max(...MODEL_GROUPS) + 1;
-  const lengths = new Int32Array(groups * INTEGER_BITS_LIMIT).fill(INITIAL_LENGTH_PROBABILITY),
-    signs = new Int32Array(groups).fill(HALF_PROBABILITY);
-  const decodeAdaptive = (model: Int32Array, index: number): 0 | 1 => {
-    const bit = decoder.decodeBit(model[index]);
-    model[index] = Math.min(Math.max(model[index] + (((bit ? 32768 : 0) - model[index]) >> 3), 1024), 31744);
-    return bit;
-  };
-  const values = new Float64Array(MODEL_GROUPS.length);
-  MODEL_GROUPS.forEach((group, i) => {
-    let length = 0;
-    while (length < INTEGER_BITS_LIMIT && decodeAdaptive(lengths, group * INTEGER_BITS_LIMIT + length)) length++;
-    if (length === INTEGER_BITS_LIMIT)
-      throw new DamagedBlock(`Invalid skeleton description: an integer has ${INTEGER_BITS_LIMIT} or more bits.`);
-    let magnitude = ((1 << length) | decoder.decodeBits(length)) - 1;
-    let negative = magnitude > 0 && decoder.decodeBit(HALF_PROBABILITY) === 1;
-    if (MIRROR_OF[i] >= 0) {
-      const mirrored = values[MIRROR_OF[i]];
-      magnitude = Math.abs(mirrored) + (negative ? -magnitude : magnitude);
-      if (magnitude < 0) throw new DamagedBlock("Invalid skeleton description: an integer has a negative magnitude.");
-      negative = magnitude > 0 && (decodeAdaptive(signs, group) === 1) !== mirrored < 0;
-    }
-    values[i] = negative ? -magnitude : magnitude;
-  });
-  return values;
 }
