@@ -149,6 +149,9 @@ def upload(
     table.add_row("length", f"{motion['duration']:.2f} s, {motion['frames']} frames at {motion['fps']:g} fps")
     table.add_row("joints", f"{len(motion['joints'])} of 18, names: {motion['profile']}")
     table.add_row("fit", f"{motion['fit']['mean_mm']:.1f} mm mean, {motion['fit']['max_mm']:.1f} mm maximum")
+    if extension := motion.get("extension"):
+        table.add_row("extended", ", ".join(extension["joints"]))
+        table.add_row("", f"{extension['fit']['mean_mm']:.1f} mm mean, {extension['fit']['max_mm']:.1f} mm maximum")
     table.add_row("rates", ", ".join(f"{rate['kbps']:.1f} kbit/s" for rate in motion["rates"]))
     for assumption in motion["guessed"]:
         table.add_row("assumed", assumption)

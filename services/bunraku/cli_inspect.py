@@ -68,7 +68,24 @@ def _describe(source: SourceMotion, analysis: Analysis) -> dict[str, Any]:
             "max_mm": round(analysis.max_fit_error_mm, 3),
             "joints_mm": {joint: round(each.mean_mm, 3) for joint, each in analysis.joint_fits.items()},
         },
+        "extension": _describe_extension(source, analysis),
         "guessed": analysis.assumptions,
+    }
+
+
+def _describe_extension(source: SourceMotion, analysis: Analysis) -> dict[str, Any] | None:
+    """Return the joints of the extension, and the fit with them; None if there is no extension."""
+    extension = analysis.extension
+    if extension is None:
+        return None
+    return {
+        "joints": dict(
+            zip(extension.extension.names, (source.names[joint] for joint in extension.sources), strict=True)
+        ),
+        "fit": {
+            "mean_mm": round(analysis.extended_mean_error_mm, 3),
+            "max_mm": round(analysis.extended_max_error_mm, 3),
+        },
     }
 
 
@@ -87,13 +104,23 @@ def _print(source: SourceMotion, analysis: Analysis) -> None:
     out.print(
         f"fit: {analysis.mean_fit_error_mm:.1f} mm mean, {analysis.max_fit_error_mm:.1f} mm maximum", highlight=False
     )
+    if analysis.extension is not None:
+        out.print(
+            f"with {', '.join(analysis.extension.extension.names)}: {analysis.extended_mean_error_mm:.1f} mm mean, "
+            f"{analysis.extended_max_error_mm:.1f} mm maximum",
+            highlight=False,
+        )
     for assumption in analysis.assumptions:
         out.print(f"assumed: {assumption}", highlight=False)
 
 
 def _skeleton_tree(source: SourceMotion, analysis: Analysis) -> Tree:
     """Return the joints of the source with the figure's joints that follow them, and their mean distance."""
-    mapped = {each.source: (joint, each.mean_mm) for joint, each in analysis.joint_fits.items()}
+    mapped: dict[int, tuple[str, float | None]] = {}
+    if analysis.extension is not None:
+        names = analysis.extension.extension.names
+        mapped = {joint: (name, None) for joint, name in zip(analysis.extension.sources, names, strict=True)}
+    mapped |= {each.source: (joint, each.mean_mm) for joint, each in analysis.joint_fits.items()}
     root = Tree(_joint_label(source.names[0], mapped.get(0)))
     trees = [root]
     for joint in range(1, min(len(source.names), MAX_TREE_JOINTS)):
@@ -103,11 +130,13 @@ def _skeleton_tree(source: SourceMotion, analysis: Analysis) -> Tree:
     return root
 
 
-def _joint_label(name: str, follower: tuple[str, float] | None) -> Text:
-    """Return the name of a source joint, and the joint of the figure that follows it with their distance."""
+def _joint_label(name: str, follower: tuple[str, float | None] | None) -> Text:
+    """Return the name of a source joint, and the joint that follows it, if one of the figure with their distance."""
     label = Text(escape_text(name))
     if follower is None:
         label.stylize("dim")
         return label
     joint, mean_mm = follower
+    if mean_mm is None:
+        return label + Text(f"  {joint}", style="green")
     return label + Text(f"  {joint}  {mean_mm:.1f} mm", style="bold red" if mean_mm > POOR_JOINT_MM else "green")
