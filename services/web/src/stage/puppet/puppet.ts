@@ -11,6 +11,7 @@ import {
   type Vector3,
 } from "three";
 import { type Figure, JOINTS, PARENTS, type Pose } from "../../motion/skeleton";
+import { STANDING_HEIGHT_M } from "../camera/audience-camera";
 import { figureScale, restPositions } from "./figure-fit";
 import { floorHeight, handlePosition, type Performer } from "./performer";
 import type { PuppetAssets } from "./puppet-assets";
@@ -69,6 +70,10 @@ export class Puppet implements Performer {
 
   get root(): Matrix4 {
     return this.#bones[0].matrixWorld;
+  }
+
+  get height(): number {
+    return STANDING_HEIGHT_M * this.scale;
   }
 
   get ground(): number {
