@@ -94,11 +94,15 @@ def shaped_skeletons() -> list[tuple[str, list[str], list[int], Array]]:
     for joint, parent in enumerate(PARENTS):
         standing[joint] = figure.offsets[joint] + (standing[parent] if parent >= 0 else 0.0)
     turned = rotation.rotate(rotation.from_rotation_vector(np.array([0.0, np.pi, 0.0])), 100.0 * body)
+    tail = [("hair", "neck2", [0.0, 2.02, 0.0]), ("hair2", "hair", [0.0, 2.42, 0.02])]
+    haired = [*unnamed, *(name for name, _, _ in tail)], [*parents, names.index("neck2"), len(names)]
+    hair = np.concatenate([body, [place for _, _, place in tail]])
     legs = [index for index, name in enumerate(names) if name == "torso" or name.startswith("leg")]
     return [
         ("bodies of torsos, arms and legs", names, parents, body),
         ("no names, facing away, in centimetres", unnamed, parents, np.round(turned, 6)),
         ("the standard figure without names", [f"b{number}" for number in range(len(JOINTS))], [*PARENTS], standing),
+        ("hair as long as a leg", *haired, hair),
         ("legs alone", [unnamed[k] for k in legs], [-1, 0, 1, 2, 3, 0, 5, 6, 7], body[legs]),
         ("a chain", unnamed[:6], [-1, 0, 1, 2, 3, 4], np.cumsum(np.full((6, 3), 0.1), axis=0)),
         ("one joint", ["Cube"], [-1], np.zeros((1, 3))),

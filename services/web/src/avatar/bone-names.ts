@@ -6,7 +6,8 @@ import type { Vector3 } from "three";
 import { splitWords } from "./naming/joint-name";
 import { ancestorChain, commonAncestor, isDescendant } from "./naming/joint-tree";
 import { findHeadByName, mapByName, mapPartly } from "./naming/name-mapping";
-import { findHead, mapByShape } from "./naming/shape-mapping";
+import { SIDE_WORDS } from "./naming/naming-profile";
+import { findHead, mapByShape, swapSides } from "./naming/shape-mapping";
 
 /** Joints of a file; parents come before their children. */
 export interface JointTree {
@@ -56,7 +57,7 @@ export function findBones(tree: JointTree): Map<string, number> {
   const { names, parents } = tree;
   const named = mapByName(names, parents)?.joints;
   const partial = named ? null : mapPartly(names, parents);
-  const joints = named ?? (partial?.size ? partial : mapByShape(tree));
+  const joints = named ?? (partial?.size ? partial : shapedJoints(tree));
   if (!joints) return new Map();
   const head = joints.get("skullbase") ?? findHeadByName(names, parents, joints) ?? findHead(tree, joints);
   const bones = new Map<string, number>();
@@ -71,6 +72,26 @@ export function findBones(tree: JointTree): Map<string, number> {
   if (head !== undefined) bones.set("head", head);
   addTrunk(parents, bones);
   return bones;
+}
+
+/**
+ * Return the joints that the shape gives; null if it gives none. Left and right are those in the joints' names, if they
+ * have any; else those of the feet; without feet, the file faces z as glTF demands (glTF 2.0, 3.4).
+ */
+function shapedJoints(tree: JointTree): ReadonlyMap<string, number> | null {
+  const joints = mapByShape(tree);
+  if (!joints) return null;
+  const limbs = [...joints].filter(([joint]) => /^[lr]_/.test(joint));
+  let agreement = 0;
+  for (const [joint, index] of limbs) {
+    const words = splitWords(tree.names[index]);
+    const side = [0, 1].find((at) => SIDE_WORDS.some((pair) => words.includes(pair[at])));
+    if (side !== undefined) agreement += side === "lr".indexOf(joint[0]) ? 1 : -1;
+  }
+  if (agreement === 0 && !joints.has("l_midtarsal"))
+    for (const [joint, index] of limbs) agreement += (joint[0] === "l" ? 1 : -1) * tree.positions[index].x;
+  if (agreement < 0) swapSides(joints);
+  return joints;
 }
 
 /** Return the missing required bones in plain words: "left lower arm". */

@@ -14,6 +14,14 @@ import { measureRest, type RestMeasurements } from "./rest-pose";
 
 /** Minimum distance between two bones, as a share of the height: shorter, a bone has no direction. */
 const MIN_BONE_SHARE = 1e-4;
+/** Longest bone of a body, as a multiple of the median, and its height as a multiple of that. */
+const MAX_BONE_RATIO = 20;
+/** Distances in the trunk on which the size of an avatar depends. */
+const TRUNK_BONES = [
+  ["hips", "head"],
+  ["leftUpperLeg", "leftUpperArm"],
+  ["rightUpperLeg", "rightUpperArm"],
+];
 const LIMB_BONES = ["Arm", "Leg"].flatMap((limb) =>
   ["left", "right"].map((side) => [
     `${side}Upper${limb}`,
@@ -95,13 +103,29 @@ export class AvatarModel {
   /** Throw if a limb has no length, and therefore no direction, or if a mesh cannot be drawn. */
   #checkGeometry(): void {
     const at = (bone: string) => this.rest.bones.get(bone)?.position ?? new Vector3(NaN);
-    const height = at("head").y - this.rest.soleHeight;
-    for (const limb of LIMB_BONES) {
-      for (let k = 0; k < 2; k++) {
-        if (!(at(limb[k]).distanceTo(at(limb[k + 1])) > MIN_BONE_SHARE * height))
-          throw new Error(`${limb[k]} and ${limb[k + 1]} are at the same position`);
-      }
+    const { soleHeight, topHeight } = this.rest;
+    const height = at("head").y - soleHeight;
+    const bones = [
+      ...LIMB_BONES.flatMap(([first, second, third]) => [
+        [first, second],
+        [second, third],
+      ]),
+      ...TRUNK_BONES,
+    ];
+    const lengths = bones.map(([start, end]) => at(start).distanceTo(at(end)));
+    const longest = MAX_BONE_RATIO * lengths.toSorted((a, b) => a - b)[lengths.length >> 1];
+    for (const [index, [start, end]] of bones.entries()) {
+      if (!(lengths[index] > MIN_BONE_SHARE * height)) throw new Error(`${start} and ${end} are at the same position`);
+      if (!(lengths[index] < longest)) throw new Error(`${start} and ${end} are too far apart for a body`);
     }
+    for (const [bone, node] of this.nodes) {
+      if (!isBelow(node, this.root)) throw new Error(`${bone} is not in the scene`);
+      if (!(Math.abs(node.matrixWorld.determinant()) > 0)) throw new Error(`${bone} is scaled to nothing`);
+    }
+    // A hand's mesh gives the position of its handle.
+    const extents = [topHeight - soleHeight, ...this.rest.handLengths.values()];
+    if (!extents.every((extent) => extent < longest * MAX_BONE_RATIO))
+      throw new Error("its vertices are too far apart for a body");
     this.root.traverse((object) => {
       if (!(object instanceof Mesh)) return;
       const { index, attributes } = object.geometry as BufferGeometry;
@@ -127,6 +151,11 @@ function recordImageErrors(parser: GLTFParser, errors: Map<number, unknown>): vo
       throw error;
     }
   };
+}
+
+function isBelow(node: Object3D, ancestor: Object3D): boolean {
+  for (let at: Object3D | null = node; at; at = at.parent) if (at === ancestor) return true;
+  return false;
 }
 
 /** Return the message of an error, or of what a decoder sends in its place. */

@@ -1,6 +1,6 @@
 import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
-import { findBones, missingBones, REQUIRED_BONES } from "../../src/avatar/bone-names";
+import { findBones, type JointTree, missingBones, REQUIRED_BONES } from "../../src/avatar/bone-names";
 import { splitWords } from "../../src/avatar/naming/joint-name";
 import { loadVectors } from "../golden-vectors";
 import { type NamedNode, SKELETONS, treeOf } from "./skeletons";
@@ -9,6 +9,14 @@ import { type NamedNode, SKELETONS, treeOf } from "./skeletons";
 function namesOf(nodes: readonly NamedNode[], ...bones: string[]): (string | undefined)[] {
   const all = findBones(treeOf(nodes));
   return bones.map((bone) => nodes[all.get(bone) ?? -1]?.name);
+}
+
+/** Return the skeleton whose joints have no known names. */
+function shapedBody(): JointTree {
+  const [{ names, parents, positions }] = loadVectors<{
+    by_shape: { names: string[]; parents: number[]; positions: [number, number, number][] }[];
+  }>("joint_mapping").by_shape;
+  return { names, parents, positions: positions.map((position) => new Vector3(...position)) };
 }
 
 /** Return nodes without some, whose children hang from their parents. */
@@ -79,10 +87,8 @@ describe("bones", () => {
   });
 
   test("without known names are found by the shape", () => {
-    const [{ names, parents, positions }] = loadVectors<{
-      by_shape: { names: string[]; parents: number[]; positions: number[][] }[];
-    }>("joint_mapping").by_shape;
-    const bones = findBones({ names, parents, positions: positions.map((position) => new Vector3(...position)) });
+    const { names, parents, positions } = shapedBody();
+    const bones = findBones({ names, parents, positions });
     expect(missingBones(bones)).toEqual([]);
     const nameOf = (bone: string) => names[bones.get(bone) ?? -1];
     expect(["hips", "spine", "head", "leftUpperArm", "rightHand", "leftFoot"].map(nameOf)).toEqual([
@@ -93,5 +99,21 @@ describe("bones", () => {
       "arm_R_2",
       "leg_L_3",
     ]);
+  });
+
+  test("found by the shape are on the sides that their names say, or that glTF has without feet", () => {
+    const { names, parents, positions } = shapedBody();
+    const leftHand = (tree: Partial<JointTree>) =>
+      names[findBones({ names, parents, positions, ...tree }).get("leftHand") ?? -1];
+    const mirrored = positions.map(({ x, y, z }) => new Vector3(-x, y, z));
+    const unnamed = names.map((_, joint) => `joint ${joint}`);
+    expect([leftHand({ positions: mirrored }), leftHand({ names: unnamed })]).toEqual(["arm_L_2", "arm_L_2"]);
+    // A body of which left and right are exchanged shows its feet; without feet it faces z.
+    const toes = names.map((name) => name.endsWith("5"));
+    const footless = positions.map((position, joint) => (toes[joint] ? positions[parents[joint]] : position));
+    expect(leftHand({ names: unnamed, positions: footless })).toBe("arm_L_2");
+    expect(leftHand({ names: unnamed, positions: footless.map(({ x, y, z }) => new Vector3(-x, y, z)) })).toBe(
+      "arm_R_2",
+    );
   });
 });

@@ -79,6 +79,12 @@ describe("a parsed model", () => {
     await expect(AvatarModel.parse(file.buffer, "mine")).rejects.toThrow(/indices\[0\]/);
   });
 
+  test("whose limbs are no body's is rejected", async () => {
+    await expect(AvatarModel.parse(createFigureFile({ forearm: 100 }).buffer, "mine")).rejects.toThrow(
+      /LowerArm and leftHand are too far apart/,
+    );
+  });
+
   test("whose limbs have no length is rejected", async () => {
     await expect(AvatarModel.parse(createFigureFile({ forearm: 0 }).buffer, "mine")).rejects.toThrow(
       /leftLowerArm and leftHand are at the same position/,

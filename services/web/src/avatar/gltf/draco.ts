@@ -1,5 +1,5 @@
 /**
- * Check of Draco data before it is decoded (Draco Bitstream 2.2, 4 and 5): it decodes to no more than the accessors say.
+ * Check of Draco data before it is decoded (Draco Bitstream 2.2, 4 and 5): it decodes to no more than accessors say.
  */
 import { translate } from "../../i18n/translator";
 import { fileBroken } from "../error";

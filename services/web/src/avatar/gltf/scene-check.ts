@@ -20,6 +20,10 @@ const MAX_MORPH_BYTES = 512e6;
 const MORPH_VECTOR_BYTES = 16;
 /** Numbers of a node's transform by field. */
 const TRANSFORM_LENGTHS = { matrix: 16, translation: 3, rotation: 4, scale: 3 };
+/** Largest difference of a quaternion's length from 1. */
+const MAX_ROTATION_ERROR = 0.1;
+/** Largest number in a transform; a float of the renderer loses what is smaller than a ten millionth of it. */
+const MAX_TRANSFORM = 1e7;
 /** Extension that multiplies what is drawn, and has no use in an avatar. */
 const INSTANCING = "EXT_mesh_gpu_instancing";
 
@@ -34,6 +38,8 @@ export function checkScene(json: GltfJson): readonly number[] {
     const field = `nodes[${index}]`;
     for (const [name, length] of Object.entries(TRANSFORM_LENGTHS))
       checkNumbers(node[name], `${field}.${name}`, length);
+    const turn = node.rotation as number[] | undefined;
+    if (turn && Math.abs(Math.hypot(...turn) - 1) > MAX_ROTATION_ERROR) throw invalidField(`${field}.rotation`, turn);
     if (asRecord(node.extensions)[INSTANCING] !== undefined)
       throw fileBroken(translate("{field} is not supported", { field: `${field}.extensions.${INSTANCING}` }));
     json.optionalReference("skins", node.skin, `${field}.skin`);
@@ -187,8 +193,11 @@ function checkMaterial(json: GltfJson, value: unknown, field: string, depth: num
   }
 }
 
+function isPossible(number: unknown): boolean {
+  return typeof number === "number" && Math.abs(number) <= MAX_TRANSFORM;
+}
+
 function checkNumbers(value: unknown, field: string, length: number): void {
   if (value === undefined) return;
-  if (!Array.isArray(value) || value.length !== length || !value.every(Number.isFinite))
-    throw invalidField(field, value);
+  if (!Array.isArray(value) || value.length !== length || !value.every(isPossible)) throw invalidField(field, value);
 }

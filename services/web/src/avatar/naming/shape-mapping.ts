@@ -5,6 +5,7 @@
  */
 import { Vector3 } from "three";
 import { ancestorChain, commonAncestor, isDescendant } from "./joint-tree";
+import { ARM_JOINTS, LEG_JOINTS } from "./naming-profile";
 
 /** Largest difference of left and right bones, as a share of the longer. */
 const MAX_LENGTH_DIFFERENCE = 0.15;
@@ -99,7 +100,7 @@ function findLimbPairs(skeleton: Skeleton, lengths: readonly number[]): LimbPair
   const found = limbs.flatMap((a, at) =>
     limbs
       .slice(at + 1)
-      .filter((b) => areAlike(a, b) && areDisjoint(a, b, skeleton.parents))
+      .filter((b) => areAlike(a, b) && areDisjoint(a, b, skeleton.parents) && startAlike(a, b, skeleton))
       .map((b): LimbPair => [a, b]),
   );
   const shorter = ([a, b]: LimbPair) => Math.min(a.length, b.length);
@@ -142,6 +143,14 @@ function areDisjoint(a: Limb, b: Limb, parents: readonly number[]): boolean {
   );
 }
 
+/** Return whether two limbs start equally far from the joint at which they part, as a leg and a neck do not. */
+function startAlike(a: Limb, b: Limb, { parents, positions }: Skeleton): boolean {
+  const fork = commonAncestor(parents, [a.joints[0], b.joints[0]]);
+  if (fork < 0) return false;
+  const [first, second] = [a, b].map(({ joints }) => positions[joints[0]].distanceTo(positions[fork]));
+  return Math.abs(first - second) <= MAX_LENGTH_DIFFERENCE * Math.max(a.length, b.length);
+}
+
 /** Return the joints below `start` along its longest branch, without those in `excluded`. */
 function longestBranch(
   { parents }: Skeleton,
@@ -170,7 +179,7 @@ function resolveSides(positions: readonly Vector3[], joints: Map<string, number>
   const centre = (joint: string) => new Vector3().lerpVectors(at(`l_${joint}`), at(`r_${joint}`), 0.5);
   const across = between(at("l_hip"), at("r_hip")).normalize();
   if (across.dot(between(at("l_shoulder"), at("r_shoulder")).normalize()) < MIN_ALIGNMENT)
-    swapSides(joints, ["shoulder", "elbow", "wrist"]);
+    swapSides(joints, ARM_JOINTS);
   const trunk = between(centre("shoulder"), centre("hip")).normalize();
   const up = between(centre("hip"), centre("ankle")).normalize().add(trunk).normalize();
   const forward = new Vector3().crossVectors(across, up).normalize();
@@ -181,10 +190,14 @@ function resolveSides(positions: readonly Vector3[], joints: Map<string, number>
     shown += between(knee, hip.clone().add(ankle).multiplyScalar(0.5)).dot(forward) / thigh;
     if (joints.has(`${side}_midtarsal`)) shown += between(at(`${side}_midtarsal`), ankle).dot(forward) / thigh;
   }
-  if (shown < MIN_FORWARD) swapSides(joints, ["hip", "knee", "ankle", "midtarsal", "shoulder", "elbow", "wrist"]);
+  if (shown < MIN_FORWARD) swapSides(joints);
 }
 
-function swapSides(joints: Map<string, number>, names: readonly string[]): void {
+/** Exchange left and right of some joints, by default of all. */
+export function swapSides(
+  joints: Map<string, number>,
+  names: readonly string[] = [...LEG_JOINTS, ...ARM_JOINTS],
+): void {
   for (const name of names) {
     const [left, right] = [joints.get(`l_${name}`), joints.get(`r_${name}`)];
     joints.delete(`l_${name}`);

@@ -44,6 +44,8 @@ describe("a scene", () => {
     ["nested more than 500 deep", (json) => Object.assign(json, { nodes: chain(600, -1), scenes: [] })],
     ["nodes: 30000", (json) => Object.assign(json, { nodes: Array.from({ length: 30_000 }, () => ({})) })],
     ["nodes[0].translation is", ({ nodes }) => (nodes[0].translation = [0, Number.POSITIVE_INFINITY, 0])],
+    ["nodes[0].translation is", ({ nodes }) => (nodes[0].translation = ["a", 0, 0])],
+    ["nodes[0].rotation is [0,0,0,4]", ({ nodes }) => (nodes[0].rotation = [0, 0, 0, 4])],
     ["nodes[0].matrix is", ({ nodes }) => (nodes[0].matrix = [1])],
     ["nodes[0].mesh refers to meshes 3", ({ nodes }) => (nodes[0].mesh = 3)],
     ["nodes[0].skin refers to skins 3", ({ nodes }) => (nodes[0].skin = 3)],
