@@ -77,7 +77,8 @@ export class AvatarModel {
       const gltf = await Promise.race([loader.parseAsync(bytes, ""), decoders.failure]);
       for (const [image, error] of imageErrors) throw new Error(`images[${image}]: ${messageOf(error)}`);
       model = await AvatarModel.#create(gltf, file, fallbackName);
-      model.#checkGeometry();
+      model.#checkMeshes();
+      model.#checkBody();
       return model;
     } catch (error) {
       model?.dispose();
@@ -100,8 +101,23 @@ export class AvatarModel {
     VRMUtils.deepDispose(this.root);
   }
 
-  /** Throw if a limb has no length, and therefore no direction, or if a mesh cannot be drawn. */
-  #checkGeometry(): void {
+  /** Throw if a mesh cannot be drawn. */
+  #checkMeshes(): void {
+    this.root.traverse((object) => {
+      if (!(object instanceof Mesh)) return;
+      const { index, attributes } = object.geometry as BufferGeometry;
+      const { position } = attributes;
+      const vertexCount = position.count;
+      for (let at = 0; at < vertexCount; at++)
+        if (!Number.isFinite(position.getX(at) + position.getY(at) + position.getZ(at)))
+          throw new Error(`${object.name}: POSITION[${at}] is not finite`);
+      for (let at = 0; at < (index?.count ?? 0); at++)
+        if (Number(index?.getX(at)) >= vertexCount) throw new Error(`${object.name}: indices[${at}] is no vertex`);
+    });
+  }
+
+  /** Throw if the bones or the extent are those of no body: an avatar takes its size and directions from them. */
+  #checkBody(): void {
     const at = (bone: string) => this.rest.bones.get(bone)?.position ?? new Vector3(NaN);
     const { soleHeight, topHeight } = this.rest;
     const height = at("head").y - soleHeight;
@@ -126,17 +142,6 @@ export class AvatarModel {
     const extents = [topHeight - soleHeight, ...this.rest.handLengths.values()];
     if (!extents.every((extent) => extent < longest * MAX_BONE_RATIO))
       throw new Error("its vertices are too far apart for a body");
-    this.root.traverse((object) => {
-      if (!(object instanceof Mesh)) return;
-      const { index, attributes } = object.geometry as BufferGeometry;
-      const { position } = attributes;
-      const vertexCount = position.count;
-      for (let at = 0; at < vertexCount; at++)
-        if (!Number.isFinite(position.getX(at) + position.getY(at) + position.getZ(at)))
-          throw new Error(`${object.name}: POSITION[${at}] is not finite`);
-      for (let at = 0; at < (index?.count ?? 0); at++)
-        if (Number(index?.getX(at)) >= vertexCount) throw new Error(`${object.name}: indices[${at}] is no vertex`);
-    });
   }
 }
 
