@@ -3,13 +3,13 @@ import { preloadScripts, startupChunks } from "./vite.chunks.ts";
 import { poseModules } from "./vite.pose.ts";
 import { reducedRenderer } from "./vite.renderer.ts";
 import { avatarShaders } from "./vite.shaders.ts";
-import { threeModules } from "./vite.three.ts";
+import { decoderFiles, threeModules } from "./vite.three.ts";
 
 /** Time limit of a test, a hook and a polled expectation, in milliseconds. It only ends tests that hang. */
 const TEST_TIMEOUT_MS = 120_000;
 
 export default defineConfig({
-  plugins: [threeModules, avatarShaders, reducedRenderer, preloadScripts],
+  plugins: [threeModules, decoderFiles, avatarShaders, reducedRenderer, preloadScripts],
   build: {
     outDir: "../bunraku/page",
     emptyOutDir: true,

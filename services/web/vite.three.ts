@@ -22,6 +22,22 @@ export const threeModules: Plugin = {
   },
 };
 
+/** Files that the loaders of three.js name as their defaults; ours name the ones that they use. */
+const DEFAULT_FILE = /new URL\( '[^']*', import\.meta\.url \)\.toString\(\)/g;
+
+/** Removes the default files of the loaders of compressed meshes and textures, of which most are never used. */
+export const decoderFiles: Plugin = {
+  name: "decoder-files",
+  apply: "build",
+  enforce: "pre",
+  transform: { filter: { id: /\/loaders\/(?:KTX2|DRACO)Loader\.js$/ }, handler: removeDefaultFiles },
+};
+
+/** Replace the addresses of default files in the code of a loader by empty ones. */
+export function removeDefaultFiles(code: string): string {
+  return code.replace(DEFAULT_FILE, '""');
+}
+
 /** Minify the shaders in the code of a module. */
 export function minifyShaders(code: string): string {
   return code.replace(SHADER, (_, shader: string) => {

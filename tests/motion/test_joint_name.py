@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.motion.joint_name import NameIndex, find_spellings, normalise_name, split_words
+from bunraku.motion.joint_name import NameIndex, find_spellings, normalise_name, split_words, strip_numbers
 from bunraku.motion.naming_profile import PROFILES
 
 
@@ -35,6 +35,13 @@ def test_normalised_name_is_stable(name: str) -> None:
 )
 def test_names_are_split_into_words(name: str, words: list[str]) -> None:
     assert split_words(name) == words
+
+
+def test_numbers_of_joints_are_removed_if_most_names_have_one() -> None:
+    names = ["root", "Hips_01", "Spine_02", "Spine1_03", "LeftArm_012"]
+    assert strip_numbers(names) == ["root", "Hips", "Spine", "Spine1", "LeftArm"]
+    assert strip_numbers(["pelvis", "spine_01", "spine_02", "head"]) is None
+    assert strip_numbers([]) is None
 
 
 def test_spelling_leads_from_one_knee_to_all_joints() -> None:

@@ -182,3 +182,10 @@ def test_first_of_two_equal_names_is_used() -> None:
     naming = map_by_name([*names, "LeftLeg"], [*parents, 0])
     assert naming is not None
     assert naming.joints["l_knee"] == names.index("LeftLeg")
+
+
+def test_numbers_of_joints_do_not_matter() -> None:
+    names, parents = BODIES["Mixamo"][0]
+    naming = map_by_name([f"{name}_{index:02}" for index, name in enumerate(names)], parents)
+    assert naming is not None
+    assert mapped_limb_names(naming, names) == expected_names("Mixamo")

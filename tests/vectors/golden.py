@@ -1,4 +1,4 @@
-"""Generated files by path: golden vectors, the AsyncAPI document and the TypeScript message types."""
+"""Generated files by path: golden vectors, AsyncAPI document, names of joints and TypeScript message types."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from tests.vectors import (
     blocks,
     controlled_limb,
     extension,
+    joint_mapping,
+    joint_names,
     live,
     messages,
     one_euro,
@@ -28,10 +30,12 @@ ROOT = Path(__file__).resolve().parents[2]
 PROTO_FOLDER = ROOT / "proto"
 VECTORS_FOLDER = PROTO_FOLDER / "vectors"
 ASYNCAPI_FILE = PROTO_FOLDER / "asyncapi.json"
+JOINT_NAMES_FILE = PROTO_FOLDER / "joint_names.json"
 TYPESCRIPT_FILE = ROOT / "services" / "web" / "src" / "wire" / "messages.ts"
 GENERATORS: dict[str, Callable[[], Any]] = {
     "audio.json": audio.make_vectors,
     "blocks.json": blocks.make_vectors,
+    "joint_mapping.json": joint_mapping.make_vectors,
     "live.json": live.make_vectors,
     "messages.json": messages.make_vectors,
     "one_euro.json": one_euro.make_vectors,
@@ -47,13 +51,18 @@ _NUMBER_LIST = re.compile(r"\[[-+.\deE,\s]+\]")
 
 def render_vectors(name: str) -> str:
     """Return the text of one vector file; a list of numbers is one line."""
-    text = json.dumps(GENERATORS[name](), indent=1)
+    text = json.dumps(GENERATORS[name](), indent=1, ensure_ascii=False)
     return _NUMBER_LIST.sub(lambda found: re.sub(r"\s+", "", found[0]), text) + "\n"
 
 
 def render_asyncapi() -> str:
     """Return the text of the AsyncAPI document."""
     return json.dumps(asyncapi.make_document(), indent=1) + "\n"
+
+
+def render_joint_names() -> str:
+    """Return the text of the naming conventions of joints."""
+    return json.dumps(joint_names.make_document(), indent=1, ensure_ascii=False) + "\n"
 
 
 def render_typescript() -> str:
@@ -64,4 +73,8 @@ def render_typescript() -> str:
 def render_files() -> dict[Path, str]:
     """Return the text of every generated file except `arm.json`."""
     files = {VECTORS_FOLDER / name: render_vectors(name) for name in GENERATORS}
-    return files | {ASYNCAPI_FILE: render_asyncapi(), TYPESCRIPT_FILE: render_typescript()}
+    return files | {
+        ASYNCAPI_FILE: render_asyncapi(),
+        JOINT_NAMES_FILE: render_joint_names(),
+        TYPESCRIPT_FILE: render_typescript(),
+    }

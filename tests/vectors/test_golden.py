@@ -47,6 +47,10 @@ def test_asyncapi_document_matches_the_declarations() -> None:
     assert golden.ASYNCAPI_FILE.read_text(encoding="utf-8") == golden.render_asyncapi(), "run `make vectors`"
 
 
+def test_joint_names_match_the_profiles() -> None:
+    assert golden.JOINT_NAMES_FILE.read_text(encoding="utf-8") == golden.render_joint_names(), "run `make vectors`"
+
+
 def test_typescript_message_types_match_the_declarations() -> None:
     assert golden.TYPESCRIPT_FILE.read_text(encoding="utf-8") == golden.render_typescript(), "run `make vectors`"
 

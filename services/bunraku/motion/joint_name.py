@@ -27,6 +27,21 @@ def split_words(name: str) -> list[str]:
     return [word.lower() for word in _WORD.findall(_strip_namespace(name))]
 
 
+MIN_NUMBERED_SHARE = 0.8
+"""Share of the names of a skeleton from which on numbers at their ends are those of the joints, not of the words."""
+
+
+def strip_numbers(names: Sequence[str]) -> list[str] | None:
+    """Return names without the number of the joint that converters append: "LeftArm_012" -> "LeftArm".
+
+    None if fewer than `MIN_NUMBERED_SHARE` of them have one.
+    """
+    stripped = [_JOINT_NUMBER.sub("", name) for name in names]
+    numbered = sum(short != name for short, name in zip(stripped, names, strict=True))
+    return stripped if numbered >= MIN_NUMBERED_SHARE * len(names) > 0 else None
+
+
+_JOINT_NUMBER = re.compile(r"_[0-9]+$")
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[^\W\d_A-Za-z]+")
 _SIDE_MARK = "/"
 """Precedes the side in a key for a name that was divided into side and rest; no normalised name contains it."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bunraku.motion.joint_name import NameIndex, Spelling, find_spellings, split_words
+from bunraku.motion.joint_name import NameIndex, Spelling, find_spellings, split_words, strip_numbers
 from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
 
@@ -24,7 +24,17 @@ class JointMapping:
 
 
 def map_by_name(names: Sequence[str], parents: Sequence[int]) -> JointMapping | None:
-    """Return the mapping of the profile that matches most joints, or None if none matches both arms and legs."""
+    """Return the mapping of the profile that matches most joints, or None if none matches both arms and legs.
+
+    If none does and most names end in a number of their own, as "LeftArm_012", they are compared without it.
+    """
+    found = _map_names(names, parents)
+    if found is None and (stripped := strip_numbers(names)) is not None:
+        return _map_names(stripped, parents)
+    return found
+
+
+def _map_names(names: Sequence[str], parents: Sequence[int]) -> JointMapping | None:
     index = NameIndex(names, parents)
     best: tuple[tuple[int, bool, bool], JointMapping] | None = None
     for profile in PROFILES:

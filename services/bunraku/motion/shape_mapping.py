@@ -101,6 +101,7 @@ def _find_limb_pairs(source: SourceMotion, lengths: Array) -> list[tuple[_LimbCa
             abs(x - y) <= MAX_LENGTH_DIFFERENCE * max(x, y) for x, y in zip(a.bone_lengths, b.bone_lengths, strict=True)
         )
         and _are_disjoint(a, b, source.parents)
+        and _start_alike(a, b, source)
     ]
     found.sort(key=lambda pair: -min(pair[0].length, pair[1].length))
     return [pair for pair in found if pair[1].length > MIN_LIMB_RATIO * found[0][0].length]
@@ -138,6 +139,15 @@ def _are_disjoint(a: _LimbCandidate, b: _LimbCandidate, parents: tuple[int, ...]
     if set(a.joints) & set(b.joints):
         return False
     return not is_descendant(parents, a.joints[0], b.joints[0]) and not is_descendant(parents, b.joints[0], a.joints[0])
+
+
+def _start_alike(a: _LimbCandidate, b: _LimbCandidate, source: SourceMotion) -> bool:
+    """Return whether two limbs start equally far from the joint at which they part, as a leg and a neck do not."""
+    position = source.rest_positions
+    starts = [a.joints[0], b.joints[0]]
+    fork = common_ancestor(source.parents, starts)
+    distances = np.linalg.norm(position[starts] - position[fork], axis=-1)
+    return abs(float(distances[0] - distances[1])) <= MAX_LENGTH_DIFFERENCE * max(a.length, b.length)
 
 
 def _longest_branch(source: SourceMotion, lengths: Array, start: int, excluded: set[int]) -> list[int]:

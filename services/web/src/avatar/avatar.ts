@@ -29,6 +29,8 @@ const NEXT_BONE: Readonly<Record<string, string>> = Object.fromEntries(
 const PALM_SHARE = 0.4;
 /** Length of a hand whose mesh does not show it, as a share of the forearm. */
 const DEFAULT_HAND_SHARE = 0.65;
+/** Height up to which the audience's camera shows head and hair, in metres on the standard figure: not an antenna's. */
+const MAX_FRAMED_HEIGHT_M = 3;
 /** Bones of the limbs: shoulder or hip, elbow or knee, wrist or ankle. */
 const LIMB_BONES = ["left", "right"]
   .map((side) => [`${side}UpperArm`, `${side}LowerArm`, `${side}Hand`])
@@ -47,6 +49,7 @@ export class Avatar implements Performer {
   readonly group = new Group();
   readonly figure: Figure;
   readonly scale: number;
+  readonly height: number;
   readonly root = new Matrix4();
   readonly #model: AvatarModel;
   readonly #materials: SimpleMaterials;
@@ -67,7 +70,7 @@ export class Avatar implements Performer {
     this.#joints = new Map(JOINTS.map((name) => [name, new Matrix4()]));
     this.#materials = new SimpleMaterials(model.root);
     this.group.add(model.root);
-    const { bones, soleHeight, handLengths } = model.rest;
+    const { bones, soleHeight, topHeight, handLengths } = model.rest;
     const positionOf = (bone: string) => (bones.get(bone) as { position: Vector3 }).position;
     const distance = (a: string, b: string) => positionOf(a).distanceTo(positionOf(b));
     const avatarScale =
@@ -78,6 +81,7 @@ export class Avatar implements Performer {
         distance("leftUpperArm", "leftLowerArm") +
         distance("leftLowerArm", "leftHand"));
     model.root.scale.setScalar(avatarScale);
+    this.height = Math.min(avatarScale * (topHeight - soleHeight), MAX_FRAMED_HEIGHT_M * this.scale);
     this.#alignBones(figure);
 
     const rest = restPositions(figure);

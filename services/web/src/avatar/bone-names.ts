@@ -1,9 +1,21 @@
-/** Assignment of the nodes of a plain glTF file to humanoid bones, by the names that common tools use. Pure. */
+/**
+ * Assignment of the joints of a plain glTF file to humanoid bones: by the names that common tools use, otherwise by the
+ * skeleton's shape.
+ */
+import type { Vector3 } from "three";
+import { splitWords } from "./naming/joint-name";
+import { ancestorChain, commonAncestor, isDescendant } from "./naming/joint-tree";
+import { findHeadByName, mapByName, mapPartly } from "./naming/name-mapping";
+import { SIDE_WORDS } from "./naming/naming-profile";
+import { findHead, mapByShape, swapSides } from "./naming/shape-mapping";
 
-/** A node's name in the file, and the index of its parent; -1 for a root. */
-export interface NamedNode {
-  name: string;
-  parent: number;
+/** Joints of a file; parents come before their children. */
+export interface JointTree {
+  readonly names: readonly string[];
+  /** Parent of each joint, -1 for a root. */
+  readonly parents: readonly number[];
+  /** Positions at rest in the world frame. */
+  readonly positions: readonly Vector3[];
 }
 
 /** Bones that an avatar must have: those that the stream moves, except the toes. VRM requires the same. */
@@ -25,124 +37,61 @@ export const REQUIRED_BONES: readonly string[] = [
   "rightFoot",
 ];
 
-/** Words for a bone, the likeliest first, without side, case, numbers and separators. */
-type BoneWords = Readonly<Record<string, readonly string[]>>;
-
-const CENTRE_WORDS: BoneWords = {
-  hips: ["hips", "pelvis", "humanoidroot", "hip"],
-  spine: ["spine", "vl5", "abdomen", "torso", "waist", "chest"],
-  head: ["head", "skullbase", "skull"],
+/** Bones of a side by H-Anim joint. */
+const LIMB_BONES: Readonly<Record<string, string>> = {
+  shoulder: "UpperArm",
+  elbow: "LowerArm",
+  wrist: "Hand",
+  hip: "UpperLeg",
+  knee: "LowerLeg",
+  ankle: "Foot",
+  midtarsal: "Toes",
 };
-
-const COMMON_WORDS: BoneWords = {
-  UpperArm: ["upperarm", "uparm"],
-  LowerArm: ["lowerarm", "forearm"],
-  Hand: ["hand"],
-  MiddleProximal: ["middleproximal", "handmiddle", "middle", "fmiddle"],
-  UpperLeg: ["upperleg", "upleg", "thigh"],
-  LowerLeg: ["lowerleg", "calf", "shin"],
-  Foot: ["foot"],
-  Toes: ["toebase", "toes", "toe", "ball"],
-};
-
-/** Words for the limbs: the same word is the upper arm in one naming scheme and the collar bone in another. */
-const NAMING_SCHEMES: readonly BoneWords[] = [
-  // VRoid, Unreal, Unity, 3ds Max, Blender.
-  COMMON_WORDS,
-  // Mixamo.
-  { ...COMMON_WORDS, UpperArm: ["arm"], LowerLeg: ["leg"] },
-  // H-Anim, and others that name joints instead of bones.
-  {
-    ...COMMON_WORDS,
-    UpperArm: ["shoulder"],
-    LowerArm: ["elbow"],
-    Hand: ["wrist"],
-    UpperLeg: ["hip"],
-    LowerLeg: ["knee"],
-    Foot: ["ankle"],
-    Toes: ["midtarsal", "toebase", "toes", "toe", "ball"],
-  },
-  // Tools of VRChat.
-  {
-    ...COMMON_WORDS,
-    UpperArm: ["arm"],
-    LowerArm: ["elbow"],
-    Hand: ["wrist"],
-    UpperLeg: ["leg"],
-    LowerLeg: ["knee"],
-    Foot: ["ankle"],
-  },
-];
-
-/** Ancestor of each bone, at any depth. */
-const PARENT_BONE: Readonly<Record<string, string>> = {
-  spine: "hips",
-  head: "spine",
-  UpperArm: "spine",
-  LowerArm: "UpperArm",
-  Hand: "LowerArm",
-  MiddleProximal: "Hand",
-  UpperLeg: "hips",
-  LowerLeg: "UpperLeg",
-  Foot: "LowerLeg",
-  Toes: "Foot",
-};
-
-/** Words that name the tool or the skeleton, not the bone. */
-const NOISE_PATTERN =
-  /^(mixamorig|bip|valvebiped|hanim|def|org|armature|character|skeleton|rig|cc|base|j|jnt|joint|bone|c|center|b)\d*$/;
-const SIDES: Readonly<Record<string, Side>> = { l: "left", left: "left", r: "right", right: "right" };
-
-type Side = "left" | "right" | "";
+const SIDES = { l: "left", r: "right" } as const;
 
 /**
- * Return the word and the side in a node's name: "mixamorig:LeftForeArm" is the left "forearm", "spine_01" is "spine".
+ * Return the index of each bone found, by VRM bone name. If arms or legs are named, but some of their joints missing,
+ * only those that are named are returned: a shape without them is another body's.
  */
-export function parseNodeName(name: string): { word: string; side: Side } {
-  const local = name.split(/[:|]/).at(-1) ?? "";
-  const parts = local
-    .replace(/([a-z\d])([A-Z])/g, "$1 $2")
-    .replace(/([A-Z])([A-Z][a-z])/g, "$1 $2")
-    .toLowerCase()
-    .split(/[^a-z\d]+/)
-    .filter((part) => part && !NOISE_PATTERN.test(part) && !/^\d+$/.test(part));
-  const side = parts.map((part) => SIDES[part]).find((found) => found) ?? "";
-  const word = parts.filter((part) => !SIDES[part]).join("");
-  return { word: word === "vl5" ? word : word.replace(/\d+$/, ""), side };
+export function findBones(tree: JointTree): Map<string, number> {
+  const { names, parents } = tree;
+  const named = mapByName(names, parents)?.joints;
+  const partial = named ? null : mapPartly(names, parents);
+  const joints = named ?? (partial?.size ? partial : shapedJoints(tree));
+  if (!joints) return new Map();
+  const head = joints.get("skullbase") ?? findHeadByName(names, parents, joints) ?? findHead(tree, joints);
+  const bones = new Map<string, number>();
+  for (const [letter, side] of Object.entries(SIDES)) {
+    for (const [joint, bone] of Object.entries(LIMB_BONES)) {
+      const found = joints.get(`${letter}_${joint}`) ?? endOfLimb(tree, joints, letter, joint);
+      if (found !== undefined) bones.set(side + bone, found);
+    }
+    const finger = findMiddleFinger(tree, bones.get(`${side}Hand`));
+    if (finger !== undefined) bones.set(`${side}MiddleProximal`, finger);
+  }
+  if (head !== undefined) bones.set("head", head);
+  addTrunk(parents, bones);
+  return bones;
 }
 
 /**
- * Return the node index of each bone found, by VRM bone name. Of several candidates the one nearest to the root is
- * chosen.
+ * Return the joints that the shape gives; null if it gives none. Left and right are those in the joints' names, if they
+ * have any; else those of the feet; without feet, the file faces z as glTF demands (glTF 2.0, 3.4).
  */
-export function findBones(nodes: readonly NamedNode[]): Map<string, number> {
-  const parsedNames = nodes.map(({ name }) => parseNodeName(name));
-  let best = new Map<string, number>();
-  for (const scheme of NAMING_SCHEMES) {
-    const found = new Map<string, number>();
-    const find = (words: BoneWords, side: Side) => {
-      for (const [bone, candidateWords] of Object.entries(words)) {
-        const ancestor = PARENT_BONE[bone];
-        const ancestorNode =
-          ancestor === undefined ? null : found.get(ancestor in CENTRE_WORDS ? ancestor : boneName(side, ancestor));
-        if (ancestorNode === undefined) continue;
-        const candidates = candidateWords.flatMap((word) =>
-          parsedNames
-            .flatMap((one, node) => (one.word === word && one.side === side ? [node] : []))
-            .sort((a, b) => depth(nodes, a) - depth(nodes, b)),
-        );
-        const fit = candidates.find(
-          (node) => ancestorNode === null || (node !== ancestorNode && isBelow(nodes, node, ancestorNode)),
-        );
-        if (fit !== undefined) found.set(boneName(side, bone), fit);
-      }
-    };
-    find(CENTRE_WORDS, "");
-    find(scheme, "left");
-    find(scheme, "right");
-    if (found.size > best.size) best = found;
+function shapedJoints(tree: JointTree): ReadonlyMap<string, number> | null {
+  const joints = mapByShape(tree);
+  if (!joints) return null;
+  const limbs = [...joints].filter(([joint]) => /^[lr]_/.test(joint));
+  let agreement = 0;
+  for (const [joint, index] of limbs) {
+    const words = splitWords(tree.names[index]);
+    const side = [0, 1].find((at) => SIDE_WORDS.some((pair) => words.includes(pair[at])));
+    if (side !== undefined) agreement += side === "lr".indexOf(joint[0]) ? 1 : -1;
   }
-  return best;
+  if (agreement === 0 && !joints.has("l_midtarsal"))
+    for (const [joint, index] of limbs) agreement += (joint[0] === "l" ? 1 : -1) * tree.positions[index].x;
+  if (agreement < 0) swapSides(joints);
+  return joints;
 }
 
 /** Return the missing required bones in plain words: "left lower arm". */
@@ -152,19 +101,51 @@ export function missingBones(bones: ReadonlyMap<string, unknown>): string[] {
   );
 }
 
-function boneName(side: Side, bone: string): string {
-  return side + bone;
+/** Words of joints that share a limb's twist and end nothing. */
+const TWIST_WORDS = ["twist", "roll"];
+
+/** Return the only joint directly below knee or elbow, which ends a limb whatever its name; undefined otherwise. */
+function endOfLimb(
+  { names, parents }: JointTree,
+  joints: ReadonlyMap<string, number>,
+  side: string,
+  joint: string,
+): number | undefined {
+  const above = { ankle: "knee", wrist: "elbow" }[joint];
+  const start = above && joints.get(`${side}_${above}`);
+  if (start === undefined) return undefined;
+  const children = parents.flatMap((parent, child) => (parent === start ? [child] : []));
+  if (children.length !== 1 || splitWords(names[children[0]]).some((word) => TWIST_WORDS.includes(word)))
+    return undefined;
+  return children[0];
 }
 
-function depth(nodes: readonly NamedNode[], node: number): number {
-  let levels = 0;
-  for (let at = node; at >= 0 && levels <= nodes.length; at = nodes[at].parent) levels++;
-  return levels;
+/** Return the first joint of the middle finger below a hand; undefined if none is named so. */
+function findMiddleFinger({ names, parents }: JointTree, hand: number | undefined): number | undefined {
+  if (hand === undefined) return undefined;
+  const found = names.findIndex((name, joint) => {
+    const words = splitWords(name);
+    return words.includes("middle") && !words.includes("metacarpal") && isDescendant(parents, joint, hand);
+  });
+  return found < 0 ? undefined : found;
 }
 
-function isBelow(nodes: readonly NamedNode[], node: number, ancestor: number): boolean {
-  let steps = 0;
-  for (let at = node; at >= 0 && steps <= nodes.length; at = nodes[at].parent, steps++)
-    if (at === ancestor) return true;
-  return false;
+/**
+ * Add hips and spine: the joint where legs and trunk separate, whatever its name, and the next one towards arms and
+ * head.
+ */
+function addTrunk(parents: readonly number[], bones: Map<string, number>): void {
+  const indices = (...names: string[]) => names.map((name) => bones.get(name)).filter((joint) => joint !== undefined);
+  const legs = indices("leftUpperLeg", "rightUpperLeg");
+  const upper = indices("leftUpperArm", "rightUpperArm", "head");
+  if (legs.length === 0 || upper.length === 0) return;
+  const chest = commonAncestor(parents, upper);
+  const root = commonAncestor(parents, [...legs, ...upper]);
+  if (root < 0) return;
+  const limbs = new Set([...legs, ...upper]);
+  // A chest that is the root itself leaves no joint for the spine.
+  const path = ancestorChain(parents, chest);
+  const spine = path.slice(0, path.indexOf(root)).at(-1);
+  bones.set("hips", root);
+  if (spine !== undefined && !limbs.has(spine)) bones.set("spine", spine);
 }

@@ -1,117 +1,108 @@
 /**
- * Reads the JSON chunk of a GLB file and checks whether its figure can perform. Pure: meshes and textures are read
- * elsewhere.
+ * Reads the description of a GLB file and checks whether its figure can perform. Pure: meshes and textures are read
+ * elsewhere, after this check.
  */
 import { joinList, translate } from "../i18n/translator";
-import { findBones, missingBones, type NamedNode } from "./bone-names";
-import { AvatarError, exportAgainHint, fileBroken, fileTooLarge, MAX_FILE_BYTES } from "./error";
+import { cleanName } from "./author-name";
+import { findBones, missingBones } from "./bone-names";
+import { AvatarError, exportAgainHint } from "./error";
+import { type Compression, findCompressions } from "./gltf/compression";
+import { parseContainer } from "./gltf/container";
+import { checkData } from "./gltf/data-check";
+import { collectJoints } from "./gltf/joint-tree";
+import { asList, asRecord, asText } from "./gltf/json";
+import { checkScene } from "./gltf/scene-check";
+import { GltfJson, invalidField } from "./gltf/schema";
 
-const MAGIC = 0x46546c67;
-const JSON_CHUNK = 0x4e4f534a;
-const HEADER_BYTES = 12;
-const CHUNK_HEADER_BYTES = 8;
-
-/** glTF compressions that need separate decoders, with their common names. */
-const COMPRESSION_EXTENSIONS: Readonly<Record<string, string>> = {
-  KHR_draco_mesh_compression: "Draco",
-  EXT_meshopt_compression: "meshopt",
-  KHR_meshopt_compression: "meshopt",
-  KHR_texture_basisu: "KTX2 textures",
-};
-
-const EXPORT_AS_GLB = "Export it as one binary glTF file, .glb or .vrm.";
+/** Names of parts that an error quotes. */
+const MAX_QUOTED_NAMES = 3;
 
 /** Content of a file: bones as node indices, and the author's name for it, if any. */
 export interface AvatarFile {
   vrm: boolean;
   name: string | null;
   bones: ReadonlyMap<string, number>;
+  /** Compressions that need decoders. */
+  compressions: ReadonlySet<Compression>;
 }
 
 /** Parse the description of a figure from a file's bytes. Throw AvatarError if it cannot be used. */
 export function parseAvatarFile(bytes: ArrayBuffer): AvatarFile {
-  if (bytes.byteLength > MAX_FILE_BYTES) throw fileTooLarge(bytes.byteLength);
-  const json = asRecord(parseJsonChunk(bytes));
-  for (const required of asList(json.extensionsRequired)) {
-    const compression = COMPRESSION_EXTENSIONS[String(required)];
-    if (compression)
-      throw new AvatarError(
-        translate("Unsupported compression"),
-        translate("{compression} is not supported", { compression }),
-        translate("Export it without {compression}.", { compression }),
-      );
-  }
-  const externalCandidates = [
-    ...asList(json.buffers),
-    ...asList(json.images).filter((image) => !asText(asRecord(image).uri)?.startsWith("data:image/")),
-  ];
-  for (const uri of externalCandidates.map((part) => asText(asRecord(part).uri))) {
-    if (uri)
-      throw new AvatarError(
-        translate("Not a single file"),
-        translate("it refers to the external file {address}", { address: uri.slice(0, 60) }),
-        translate(EXPORT_AS_GLB),
-      );
-  }
-  const nodes = parseNodes(json);
-  const vrmDeclaration = vrmBones(json);
-  const bones = vrmDeclaration
-    ? new Map([...vrmDeclaration.bones].filter(([, node]) => node in nodes))
-    : findBones(nodes);
-  const missing = missingBones(bones);
-  if (missing.length > 0) {
-    const detail =
-      bones.size === 0
-        ? translate("no humanoid bones found")
-        : translate("missing bones: {bones}", { bones: joinList(missing) });
-    throw new AvatarError(
-      translate("No usable humanoid"),
-      detail,
-      translate("Bones are found in VRM files and by the names of Mixamo, VRoid, Unreal, Unity and H-Anim."),
-    );
-  }
-  if (asList(json.meshes).length === 0)
+  const { json: description, binary } = parseContainer(bytes);
+  const json = new GltfJson(asRecord(description));
+  const { version } = asRecord(json.root.asset);
+  if (!/^2\.\d+$/.test(asText(version) ?? "")) throw invalidField("asset.version", version);
+  const parents = checkScene(json);
+  checkData(json, binary?.length ?? 0);
+  const compressions = findCompressions(json, binary ?? new Uint8Array());
+  const declaration = vrmBones(json);
+  const bones = declaration ? declaredBones(json, declaration.bones) : undeclaredBones(json, parents);
+  if (json.list("meshes").length === 0)
     throw new AvatarError(translate("Nothing to draw"), translate("it has bones, but no mesh"), exportAgainHint());
-  return { vrm: vrmDeclaration !== null, name: vrmDeclaration?.name ?? null, bones };
+  return { vrm: declaration !== null, name: declaration?.name ?? null, bones, compressions };
 }
 
-function parseJsonChunk(bytes: ArrayBuffer): unknown {
-  const view = new DataView(bytes);
-  if (bytes.byteLength < HEADER_BYTES || view.getUint32(0, true) !== MAGIC)
-    throw new AvatarError(
-      translate("Not a GLB file"),
-      translate("it does not start like binary glTF"),
-      translate(EXPORT_AS_GLB),
-    );
-  if (view.getUint32(4, true) !== 2)
-    throw new AvatarError(
-      translate("Unsupported glTF version"),
-      translate("version {version}; only version 2 is supported", { version: view.getUint32(4, true) }),
-      exportAgainHint(),
-    );
-  if (bytes.byteLength < HEADER_BYTES + CHUNK_HEADER_BYTES || view.getUint32(8, true) > bytes.byteLength)
-    throw fileBroken(translate("the file is truncated"));
-  const length = view.getUint32(HEADER_BYTES, true);
-  const begin = HEADER_BYTES + CHUNK_HEADER_BYTES;
-  if (view.getUint32(HEADER_BYTES + 4, true) !== JSON_CHUNK || begin + length > bytes.byteLength)
-    throw fileBroken(translate("the JSON chunk is missing or too long"));
-  try {
-    return JSON.parse(new TextDecoder().decode(new Uint8Array(bytes, begin, length)));
-  } catch {
-    throw fileBroken(translate("the JSON chunk cannot be parsed"));
-  }
+/** Return the bones that a VRM file declares. Throw AvatarError if required ones are missing. */
+function declaredBones(json: GltfJson, declared: ReadonlyMap<string, number>): ReadonlyMap<string, number> {
+  const bones = new Map([...declared].filter(([, node]) => node in json.list("nodes")));
+  const missing = missingBones(bones);
+  if (missing.length > 0) throw bonesMissing(missing);
+  return bones;
+}
+
+/** Return the bones that names or shape give. Throw AvatarError if required ones are missing. */
+function undeclaredBones(json: GltfJson, parents: readonly number[]): ReadonlyMap<string, number> {
+  const joints = collectJoints(json, parents);
+  const bones = findBones(joints);
+  const missing = missingBones(bones);
+  if (missing.length === 0) return new Map([...bones].map(([bone, joint]) => [bone, joints.nodes[joint]]));
+  throw bones.size > 0 ? bonesMissing(missing) : noBody(json);
+}
+
+function bonesMissing(missing: readonly string[]): AvatarError {
+  return new AvatarError(
+    translate("No usable humanoid"),
+    translate("missing bones: {bones}", { bones: joinList(missing) }),
+    bonesHint(),
+  );
+}
+
+/** Return the error for a file without a body, such as a helmet or a car. */
+function noBody(json: GltfJson): AvatarError {
+  const names = ["meshes" as const, "nodes" as const].flatMap((list) =>
+    json.list(list).map((item) => cleanName(asText(asRecord(item).name))),
+  );
+  const quoted = [...new Set(names.filter((name) => name !== null))].slice(0, MAX_QUOTED_NAMES);
+  const joints = new Set(json.list("skins").flatMap((skin) => asList(asRecord(skin).joints)));
+  const counts = { meshes: json.list("meshes").length, joints: joints.size };
+  return new AvatarError(
+    translate("No usable humanoid"),
+    quoted.length > 0
+      ? translate("no body found in {meshes} meshes and {joints} joints ({names})", {
+          ...counts,
+          names: joinList(quoted),
+        })
+      : translate("no body found in {meshes} meshes and {joints} joints", counts),
+    bonesHint(),
+  );
+}
+
+function bonesHint(): string {
+  return translate(
+    "An avatar needs a skeleton with two arms, two legs and a head: a VRM file, or joints named as by Mixamo, Blender, Unreal, Unity or H-Anim.",
+  );
 }
 
 /** Return the bones that a VRM file (version 1 or 0) declares; null if it is not a VRM file. */
-function vrmBones(json: Record<string, unknown>): { name: string | null; bones: Map<string, number> } | null {
-  const extensions = asRecord(json.extensions);
+function vrmBones(json: GltfJson): { name: string | null; bones: Map<string, number> } | null {
+  const extensions = asRecord(json.root.extensions);
   if (extensions.VRMC_vrm) {
     const { meta, humanoid } = asRecord(extensions.VRMC_vrm);
     const bones = Object.entries(asRecord(asRecord(humanoid).humanBones)).map(([bone, at]): [string, number] => [
       bone,
       Number(asRecord(at).node),
     ]);
-    return { name: asText(asRecord(meta).name), bones: new Map(bones) };
+    return { name: cleanName(asText(asRecord(meta).name)), bones: new Map(bones) };
   }
   if (extensions.VRM) {
     const { meta, humanoid } = asRecord(extensions.VRM);
@@ -119,27 +110,7 @@ function vrmBones(json: Record<string, unknown>): { name: string | null; bones: 
       String(asRecord(at).bone),
       Number(asRecord(at).node),
     ]);
-    return { name: asText(asRecord(meta).title), bones: new Map(bones) };
+    return { name: cleanName(asText(asRecord(meta).title)), bones: new Map(bones) };
   }
   return null;
-}
-
-function parseNodes(json: Record<string, unknown>): NamedNode[] {
-  const nodes = asList(json.nodes).map((node) => ({ name: asText(asRecord(node).name) ?? "", parent: -1 }));
-  asList(json.nodes).forEach((node, parent) => {
-    for (const child of asList(asRecord(node).children)) if (nodes[Number(child)]) nodes[Number(child)].parent = parent;
-  });
-  return nodes;
-}
-
-function asRecord(value: unknown): Record<string, unknown> {
-  return typeof value === "object" && value !== null ? (value as Record<string, unknown>) : {};
-}
-
-function asList(value: unknown): unknown[] {
-  return Array.isArray(value) ? value : [];
-}
-
-function asText(value: unknown): string | null {
-  return typeof value === "string" && value.trim() ? value.trim() : null;
 }

@@ -3,15 +3,25 @@
  * loaded on demand.
  */
 import { type VRM, VRMLoaderPlugin, VRMUtils } from "@pixiv/three-vrm";
-import { Group, type Material, Mesh, type Object3D, TextureLoader, Vector3 } from "three";
-import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { fileBroken } from "./error";
-import { parseAvatarFile } from "./file";
+import { type BufferGeometry, Group, type Material, Mesh, type Object3D, TextureLoader, Vector3 } from "three";
+import { type GLTF, GLTFLoader, type GLTFParser } from "three/examples/jsm/loaders/GLTFLoader.js";
+import { translate } from "../i18n/translator";
+import { Decoders } from "./decoding/decoders";
+import { AvatarError, fileBroken } from "./error";
+import { type AvatarFile, parseAvatarFile } from "./file";
 import { dimMToonMaterials, simplifyMaterials } from "./materials";
 import { measureRest, type RestMeasurements } from "./rest-pose";
 
 /** Minimum distance between two bones, as a share of the height: shorter, a bone has no direction. */
 const MIN_BONE_SHARE = 1e-4;
+/** Longest bone of a body, as a multiple of the median, and its height as a multiple of that. */
+const MAX_BONE_RATIO = 20;
+/** Distances in the trunk on which the size of an avatar depends. */
+const TRUNK_BONES = [
+  ["hips", "head"],
+  ["leftUpperLeg", "leftUpperArm"],
+  ["rightUpperLeg", "rightUpperArm"],
+];
 const LIMB_BONES = ["Arm", "Leg"].flatMap((limb) =>
   ["left", "right"].map((side) => [
     `${side}Upper${limb}`,
@@ -50,31 +60,40 @@ export class AvatarModel {
    * Parse a GLB or VRM file; `fallbackName` is used if the file has no name. Throw AvatarError if it cannot be used.
    */
   static async parse(bytes: ArrayBuffer, fallbackName: string): Promise<AvatarModel> {
-    const { vrm, name, bones } = parseAvatarFile(bytes);
+    const file = parseAvatarFile(bytes);
     const loader = new GLTFLoader();
-    // Textures as image elements where there are any: an embedding page's content security policy may allow fetches
-    // from servers alone. Workers fetch their textures from memory, which our own policy allows.
-    if (typeof Image !== "undefined")
-      loader.register((parser) => {
-        parser.textureLoader = new TextureLoader(parser.options.manager);
-        return { name: "textures as image elements" };
-      });
-    if (vrm) loader.register((parser) => new VRMLoaderPlugin(parser, { autoUpdateHumanBones: false }));
+    const imageErrors = new Map<number, unknown>();
+    loader.register((parser) => {
+      // Textures as image elements where there are any: an embedding page's content security policy may allow fetches
+      // from servers alone. Workers fetch their textures from memory, which our own policy allows.
+      if (typeof Image !== "undefined") parser.textureLoader = new TextureLoader(parser.options.manager);
+      recordImageErrors(parser, imageErrors);
+      return { name: "images" };
+    });
+    if (file.vrm) loader.register((parser) => new VRMLoaderPlugin(parser, { autoUpdateHumanBones: false }));
+    const decoders = await Decoders.create(loader, file.compressions);
+    let model: AvatarModel | null = null;
     try {
-      const gltf = await loader.parseAsync(bytes, "");
-      const nodes = new Map<string, Object3D>();
-      for (const [bone, index] of bones) nodes.set(bone, (await gltf.parser.getDependency("node", index)) as Object3D);
-      const model = new AvatarModel(
-        name ?? fallbackName,
-        nodes,
-        (gltf.userData.vrm as VRM | undefined) ?? null,
-        gltf.scene,
-      );
-      model.#checkLimbs();
+      const gltf = await Promise.race([loader.parseAsync(bytes, ""), decoders.failure]);
+      for (const [image, error] of imageErrors) throw new Error(`images[${image}]: ${messageOf(error)}`);
+      model = await AvatarModel.#create(gltf, file, fallbackName);
+      model.#checkMeshes();
+      model.#checkBody();
       return model;
     } catch (error) {
-      throw fileBroken(`its content could not be read (${error instanceof Error ? error.message : String(error)})`);
+      model?.dispose();
+      throw error instanceof AvatarError
+        ? error
+        : fileBroken(translate("its content could not be read: {reason}", { reason: messageOf(error) }));
+    } finally {
+      decoders.dispose();
     }
+  }
+
+  static async #create(gltf: GLTF, { bones, name }: AvatarFile, fallbackName: string): Promise<AvatarModel> {
+    const nodes = new Map<string, Object3D>();
+    for (const [bone, index] of bones) nodes.set(bone, (await gltf.parser.getDependency("node", index)) as Object3D);
+    return new AvatarModel(name ?? fallbackName, nodes, (gltf.userData.vrm as VRM | undefined) ?? null, gltf.scene);
   }
 
   dispose(): void {
@@ -82,15 +101,70 @@ export class AvatarModel {
     VRMUtils.deepDispose(this.root);
   }
 
-  /** Throw if a limb has no length, and therefore no direction. */
-  #checkLimbs(): void {
-    const at = (bone: string) => this.rest.bones.get(bone)?.position ?? new Vector3(NaN);
-    const height = at("head").y - this.rest.soleHeight;
-    for (const limb of LIMB_BONES) {
-      for (let k = 0; k < 2; k++) {
-        if (!(at(limb[k]).distanceTo(at(limb[k + 1])) > MIN_BONE_SHARE * height))
-          throw new Error(`${limb[k]} and ${limb[k + 1]} are at the same position`);
-      }
-    }
+  /** Throw if a mesh cannot be drawn. */
+  #checkMeshes(): void {
+    this.root.traverse((object) => {
+      if (!(object instanceof Mesh)) return;
+      const { index, attributes } = object.geometry as BufferGeometry;
+      const { position } = attributes;
+      const vertexCount = position.count;
+      for (let at = 0; at < vertexCount; at++)
+        if (!Number.isFinite(position.getX(at) + position.getY(at) + position.getZ(at)))
+          throw new Error(`${object.name}: POSITION[${at}] is not finite`);
+      for (let at = 0; at < (index?.count ?? 0); at++)
+        if (Number(index?.getX(at)) >= vertexCount) throw new Error(`${object.name}: indices[${at}] is no vertex`);
+    });
   }
+
+  /** Throw if the bones or the extent are those of no body: an avatar takes its size and directions from them. */
+  #checkBody(): void {
+    const at = (bone: string) => this.rest.bones.get(bone)?.position ?? new Vector3(NaN);
+    const { soleHeight, topHeight } = this.rest;
+    const height = at("head").y - soleHeight;
+    const bones = [
+      ...LIMB_BONES.flatMap(([first, second, third]) => [
+        [first, second],
+        [second, third],
+      ]),
+      ...TRUNK_BONES,
+    ];
+    const lengths = bones.map(([start, end]) => at(start).distanceTo(at(end)));
+    const longest = MAX_BONE_RATIO * lengths.toSorted((a, b) => a - b)[lengths.length >> 1];
+    for (const [index, [start, end]] of bones.entries()) {
+      if (!(lengths[index] > MIN_BONE_SHARE * height)) throw new Error(`${start} and ${end} are at the same position`);
+      if (!(lengths[index] < longest)) throw new Error(`${start} and ${end} are too far apart for a body`);
+    }
+    for (const [bone, node] of this.nodes) {
+      if (!isBelow(node, this.root)) throw new Error(`${bone} is not in the scene`);
+      if (!(Math.abs(node.matrixWorld.determinant()) > 0)) throw new Error(`${bone} is scaled to nothing`);
+    }
+    // A hand's mesh gives the position of its handle.
+    const extents = [topHeight - soleHeight, ...this.rest.handLengths.values()];
+    if (!extents.every((extent) => extent < longest * MAX_BONE_RATIO))
+      throw new Error("its vertices are too far apart for a body");
+  }
+}
+
+/** Make a parser write errors of images into `errors` by index; it would leave out their textures. */
+function recordImageErrors(parser: GLTFParser, errors: Map<number, unknown>): void {
+  const load = parser.loadImageSource;
+  parser.loadImageSource = async function (index, loader) {
+    try {
+      return await load.call(this, index, loader);
+    } catch (error) {
+      errors.set(index, error);
+      throw error;
+    }
+  };
+}
+
+function isBelow(node: Object3D, ancestor: Object3D): boolean {
+  for (let at: Object3D | null = node; at; at = at.parent) if (at === ancestor) return true;
+  return false;
+}
+
+/** Return the message of an error, or of what a decoder sends in its place. */
+function messageOf(error: unknown): string {
+  const { message = null, error: inner = null } = (error ?? {}) as { message?: unknown; error?: unknown };
+  return String(message ?? inner ?? error);
 }

@@ -8,6 +8,9 @@ const FINGER_BONES = ["leftMiddleProximal", "rightMiddleProximal"];
 /** Position of the ball in a foot without toes, as a share of the way from ankle to front. */
 const BALL_SHARE = 0.7;
 
+/** Number of vertices of a mesh of which the highest is sought. */
+const MAX_MEASURED_VERTICES = 100_000;
+
 /** A bone at rest, in the frame of the model facing z with y up; lengths are the file's. */
 export interface RestBone {
   position: Vector3;
@@ -23,6 +26,8 @@ export interface RestMeasurements {
   bones: ReadonlyMap<string, RestBone>;
   /** Height of the soles. */
   soleHeight: number;
+  /** Height of the highest vertex, of head or hair. */
+  topHeight: number;
   /** Points under heel and ball for each foot bone, in its node's frame. */
   solePoints: ReadonlyMap<string, readonly Vector3[]>;
   /** Length from each hand bone to the finger tips, as far as its mesh reaches. */
@@ -48,7 +53,7 @@ export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>):
         parentRotation: (node.parent ?? stand).getWorldQuaternion(new Quaternion()),
       });
   }
-  const clouds = collectVertices(stand, nodes);
+  const { clouds, top } = collectVertices(stand, nodes);
   const feet = SIDES.map((side) => [...(clouds.get(`${side}Foot`) ?? []), ...(clouds.get(`${side}Toes`) ?? [])]);
   const all = feet.flat();
   const lowest =
@@ -61,6 +66,7 @@ export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>):
     facing,
     bones,
     soleHeight: lowest,
+    topHeight: top,
     solePoints: new Map(SIDES.map((side, at) => [`${side}Foot`, solePointsOf(side, nodes, feet[at], lowest)])),
     handLengths: new Map(
       SIDES.map((side) => [`${side}Hand`, handLength(side, nodes, clouds.get(`${side}Hand`) ?? [])]),
@@ -120,8 +126,15 @@ function handLength(side: Side, nodes: ReadonlyMap<string, Object3D>, cloud: rea
   return Math.max(0, ...cloud.map((place) => place.distanceTo(hand)));
 }
 
-/** Return the vertices of hands and feet in the rest pose, by the bone with the largest weight. */
-function collectVertices(stand: Group, nodes: ReadonlyMap<string, Object3D>): Map<string, Vector3[]> {
+/**
+ * Return the vertices of hands and feet in the rest pose, by the bone with the largest weight, and the height of the
+ * highest vertex. Of a large mesh only some others than those of hands and feet are looked at.
+ */
+function collectVertices(
+  stand: Group,
+  nodes: ReadonlyMap<string, Object3D>,
+): { clouds: Map<string, Vector3[]>; top: number } {
+  let top = positionOf(nodes.get("head") as Object3D).y;
   const bones = new Map(
     [...nodes].filter(([bone]) => (BONES as readonly string[]).includes(bone)).map(([bone, node]) => [node, bone]),
   );
@@ -136,17 +149,24 @@ function collectVertices(stand: Group, nodes: ReadonlyMap<string, Object3D>): Ma
   stand.traverse((mesh) => {
     if (!(mesh instanceof Mesh)) return;
     const { position, skinIndex, skinWeight } = mesh.geometry.attributes as Record<string, BufferAttribute | undefined>;
+    const step = Math.ceil((position?.count ?? 0) / MAX_MEASURED_VERTICES);
     for (let i = 0; i < (position?.count ?? 0); i++) {
       const skinned = mesh instanceof SkinnedMesh && skinIndex && skinWeight;
       const carrier = carrierOf(skinned ? mesh.skeleton.bones[dominantBone(skinIndex, skinWeight, i)] : mesh);
-      if (!carrier || !/Hand|Foot|Toes/.test(carrier)) continue;
+      const isEndOfLimb = carrier !== null && /Hand|Foot|Toes/.test(carrier);
+      if (!isEndOfLimb && i % step !== 0) continue;
       const place = mesh.getVertexPosition(i, new Vector3()).applyMatrix4(mesh.matrixWorld);
+      // A prop in a hand is no part of the body.
+      if (!isEndOfLimb) {
+        top = Math.max(top, place.y);
+        continue;
+      }
       const cloud = clouds.get(carrier);
       if (cloud) cloud.push(place);
       else clouds.set(carrier, [place]);
     }
   });
-  return clouds;
+  return { clouds, top };
 }
 
 /** Return the index of the bone with the largest weight on a vertex. */

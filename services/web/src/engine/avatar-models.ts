@@ -32,8 +32,11 @@ export class AvatarModels {
   async load(performer: number, file: File): Promise<string | null> {
     this.#pendingFiles.set(performer, file);
     try {
-      const [{ Avatar, AvatarModel }, bytes] = await Promise.all([import("./avatar-chunk"), file.arrayBuffer()]);
-      const model = await AvatarModel.parse(bytes, file.name.replace(/\.\w+$/, ""));
+      const [{ Avatar, AvatarModel, nameOfFile }, bytes] = await Promise.all([
+        import("./avatar-chunk"),
+        file.arrayBuffer(),
+      ]);
+      const model = await AvatarModel.parse(bytes, nameOfFile(file.name));
       if (this.#pendingFiles.get(performer) !== file) {
         model.dispose();
         return null;

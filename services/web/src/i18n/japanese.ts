@@ -141,17 +141,21 @@ export const JAPANESE_PAGE_MESSAGES = {
   "File damaged": "壊れています",
   "Export it again, or try another file.": "書き出し直すか、別のファイルをお試しください。",
   "Unsupported compression": "圧縮されています",
-  "{compression} is not supported": "このページは{compression}を読み込めません",
+  "{compression} needs WebGL 2, which this browser does not have":
+    "{compression}にはWebGL 2が必要ですが、このブラウザにはありません",
   "Export it without {compression}.": "{compression}なしで書き出してください。",
   "Export it as one binary glTF file, .glb or .vrm.":
     "1つのバイナリglTFファイル（.glbか.vrm）として書き出してください。",
   "Not a single file": "1つのファイルにまとまっていません",
   "it refers to the external file {address}": "「{address}」を参照しています",
-  "no humanoid bones found": "人型のボーンが見つかりません",
+  "no body found in {meshes} meshes and {joints} joints":
+    "人の体が見つかりません（メッシュ{meshes}、ジョイント{joints}）",
+  "no body found in {meshes} meshes and {joints} joints ({names})":
+    "人の体が見つかりません（メッシュ{meshes}、ジョイント{joints}：{names}）",
   "missing bones: {bones}": "見つからないボーン：{bones}",
   "No usable humanoid": "踊れる人型ではありません",
-  "Bones are found in VRM files and by the names of Mixamo, VRoid, Unreal, Unity and H-Anim.":
-    "VRMのボーンと、Mixamo・VRoid・Unreal・Unity・H-Animの名前のボーンがわかります。",
+  "An avatar needs a skeleton with two arms, two legs and a head: a VRM file, or joints named as by Mixamo, Blender, Unreal, Unity or H-Anim.":
+    "両腕・両脚・頭のあるスケルトンが必要です。VRMファイル、またはMixamo・Blender・Unreal・Unity・H-Animの名前のジョイントをお使いください。",
   "Nothing to draw": "表示するものがありません",
   "it has bones, but no mesh": "ボーンはありますが、メッシュがありません",
   "Not a GLB file": "GLBではありません",
@@ -160,6 +164,24 @@ export const JAPANESE_PAGE_MESSAGES = {
   "version {version}; only version 2 is supported": "glTFのバージョンが{version}です。読み込めるのは2です",
   "the file is truncated": "ファイルが途中で終わっています",
   "the JSON chunk is missing or too long": "定義があるべき場所にありません",
+  "the chunk at byte {at} is {length} bytes long; the file has {rest} there":
+    "{at}バイト目のチャンクは{length}バイトとありますが、残りは{rest}バイトです",
+  "the file": "ファイル",
+  "{field} is missing": "{field}がありません",
+  "{field} is {value}, which is not possible": "{field}の値{value}は正しくありません",
+  "{field} is not supported": "{field}には対応していません",
+  "{field} is not Draco data": "{field}はDracoのデータではありません",
+  "{field} is not a KTX2 texture": "{field}はKTX2のテクスチャではありません",
+  "{field} refers to {name} {index}, which does not exist": "{field}の指す{name} {index}がありません",
+  "{field} reaches beyond the end of {of}": "{field}が{of}の終わりを超えています",
+  "{field}: node {node} has two parents": "{field}：ノード{node}に親が2つあります",
+  "nodes[{node}] is its own ancestor": "nodes[{node}]が自分自身の祖先になっています",
+  "the nodes are nested more than {max} deep": "ノードの階層が{max}段を超えています",
+  "{field}: {amount}; the limit is {max}": "{field}：{amount}。上限は{max}です",
+  "{vertices} vertices in {primitives} parts": "頂点{vertices}、部品{primitives}",
+  "Export it with fewer vertices and smaller textures.": "頂点を減らし、テクスチャを小さくして書き出してください。",
+  "it was not decoded within {seconds} s": "{seconds}秒以内に展開できませんでした",
+  "its content could not be read: {reason}": "内容を読み取れません：{reason}",
   "the JSON chunk cannot be parsed": "定義を読み取れません",
   "No dances yet. Drop a motion capture file anywhere on this page and the puppet dances it.":
     "演目はまだありません。モーションキャプチャーのファイルをこのページにドロップすると、人形が踊ります。",

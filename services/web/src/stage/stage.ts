@@ -166,9 +166,8 @@ export class Stage {
     const previousCount = this.performers.length;
     const isReplaced = this.#performerGroup.setFigures(figures);
     if (!isReplaced && this.performers.length === previousCount) return;
+    this.#fitAudience();
     if (isReplaced) {
-      this.audience.scale = this.puppet?.scale ?? 1;
-      this.#placeDisc();
       this.rig.reset(front);
       this.audience.cut();
     }
@@ -178,6 +177,7 @@ export class Stage {
   /** Set the factory of a performer (an index); null restores the puppet. */
   setPerformerFactory(factory: PerformerFactory | null, performer = 0): void {
     this.#performerGroup.setPerformerFactory(factory, performer);
+    this.#fitAudience();
     if (this.puppet) this.#compileShaders();
     this.#frameRenderer.invalidate();
   }
@@ -371,6 +371,13 @@ export class Stage {
   #compileShaders(): void {
     // Compile all shaders together: one after the other, when first visible, takes longer and causes stutter.
     this.renderer.compile(this.scene, this.audience.camera);
+  }
+
+  /** Frame the tallest performer with head and hair. */
+  #fitAudience(): void {
+    if (!this.puppet) return;
+    this.audience.scale = this.#performerGroup.tallestScale;
+    this.#placeDisc();
   }
 
   /** The disc keeps its proportion to the performer. */

@@ -76,6 +76,17 @@ function lowest(avatar: Avatar): number {
   return least;
 }
 
+test("is as high as its head reaches, but not as an antenna", async () => {
+  const figure = createStandardFigure();
+  const [plain, large, antenna] = await Promise.all(
+    [0.2, 0.8, 5].map(async (headHeight) => new Avatar(await read({ headHeight, unit: 0.01 }), figure)),
+  );
+  expect(plain.height).toBeGreaterThan(1.5);
+  expect(plain.height).toBeLessThan(1.9);
+  expect(large.height - plain.height).toBeGreaterThan(0.5);
+  expect(antenna.height).toBeCloseTo(3 * antenna.scale, 6);
+});
+
 describe.each(Object.entries(FILES))("%s", (_, options) => {
   let model: AvatarModel;
   const figure = createOtherFigure();

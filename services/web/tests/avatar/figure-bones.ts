@@ -9,6 +9,8 @@ export interface FigureShape {
   /** Length of legs and forearms relative to an adult's. */
   legLength?: number;
   forearm?: number;
+  /** Height of the head above its joint, in metres. */
+  headHeight?: number;
   without?: readonly string[];
   /** Add a tail with spring bones (VRM 1). */
   tail?: boolean;
@@ -26,13 +28,19 @@ export interface Bone {
 export const at = (x: number, y: number, z: number) => new Vector3(x, y, z);
 
 /** Return the bones of an adult of 1.65 m in the T-pose, facing z; parents first. */
-export function bonesOf({ legLength = 1, forearm = 1, without = [], tail = false }: FigureShape): Bone[] {
+export function bonesOf({
+  legLength = 1,
+  forearm = 1,
+  headHeight = 0.2,
+  without = [],
+  tail = false,
+}: FigureShape): Bone[] {
   const bones: Bone[] = [
     { name: "hips", parent: null, offset: at(0, 0.06 + 0.86 * legLength, 0), end: at(0, 0.1, 0) },
     { name: "spine", parent: "hips", offset: at(0, 0.09, -0.01), end: at(0, 0.11, 0) },
     { name: "chest", parent: "spine", offset: at(0, 0.12, 0), end: at(0, 0.2, 0) },
     { name: "neck", parent: "chest", offset: at(0, 0.24, -0.01), end: at(0, 0.08, 0) },
-    { name: "head", parent: "neck", offset: at(0, 0.09, 0.01), end: at(0, 0.2, 0) },
+    { name: "head", parent: "neck", offset: at(0, 0.09, 0.01), end: at(0, headHeight, 0) },
   ];
   for (const [side, x] of [
     ["left", 1],

@@ -14,6 +14,8 @@ export interface FigureOptions extends FigureShape {
   /** Return the name of a bone's node. */
   name?: (bone: string) => string;
   vrm?: 1 | 0;
+  /** Author's name of a VRM file. */
+  title?: string;
   /** Add a texture, and MToon materials if the file is a VRM. */
   dressed?: boolean;
   /** Lay the figure on its back, as tools with z up may. */
@@ -111,6 +113,7 @@ export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayB
       [new Float32Array(weights), "VEC4", 34962],
       [new Uint16Array(indices), "SCALAR", 34963],
       [new Float32Array(inverses), "MAT4", undefined],
+      ...(dressed ? [[textureCoordinates(positions.length / 3), "VEC2", 34962] as const] : []),
     ],
     picture,
   );
@@ -151,7 +154,7 @@ export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayB
     json.extensions = {
       VRMC_vrm: {
         specVersion: "1.0",
-        meta: { name: "Boxes", authors: ["the tests"], licenseUrl: "https://vrm.dev/licenses/1.0/" },
+        meta: { name: options.title ?? "Boxes", authors: ["the tests"], licenseUrl: "https://vrm.dev/licenses/1.0/" },
         humanoid: { humanBones: Object.fromEntries(humanBones.map((bone) => [bone, { node: index(bone) }])) },
       },
       ...springs,
@@ -161,7 +164,7 @@ export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayB
     json.extensions = {
       VRM: {
         specVersion: "0.0",
-        meta: { title: "Old boxes" },
+        meta: { title: options.title ?? "Old boxes" },
         humanoid: { humanBones: humanBones.map((bone) => ({ bone, node: index(bone) })) },
         materialProperties: dressed ? [OLD_CARTOON] : [],
       },
@@ -192,10 +195,18 @@ const OLD_CARTOON = {
   vectorProperties: { _Color: [1, 1, 1, 1], _ShadeColor: [0.6, 0.5, 0.6, 1], _OutlineColor: [0.1, 0.1, 0.1, 1] },
 };
 
+/** Return texture coordinates for `count` vertices, four for each side of a box. */
+function textureCoordinates(count: number): Float32Array {
+  const corners = [0, 0, 1, 0, 1, 1, 0, 1];
+  return Float32Array.from({ length: count * 2 }, (_, at) => corners[at % 8]);
+}
+
 /** Add the texture, and MToon colours for VRM 1. */
 function addMaterials(json: Record<string, unknown>, vrm: 0 | 1 | undefined): void {
   json.images = [{ bufferView: (json.bufferViews as unknown[]).length - 1, mimeType: "image/png" }];
   json.textures = [{ source: 0 }];
+  const [{ primitives }] = json.meshes as { primitives: { attributes: Record<string, number> }[] }[];
+  primitives[0].attributes.TEXCOORD_0 = (json.accessors as unknown[]).length - 1;
   const [material] = json.materials as Record<string, unknown>[];
   Object.assign(material, {
     name: "cloth",

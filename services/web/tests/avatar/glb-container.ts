@@ -2,11 +2,11 @@
 
 type Part = readonly [
   values: Float32Array | Uint8Array | Uint16Array,
-  type: "SCALAR" | "VEC3" | "VEC4" | "MAT4",
+  type: "SCALAR" | "VEC2" | "VEC3" | "VEC4" | "MAT4",
   target: number | undefined,
 ];
 
-const WIDTHS = { SCALAR: 1, VEC3: 3, VEC4: 4, MAT4: 16 };
+const WIDTHS = { SCALAR: 1, VEC2: 2, VEC3: 3, VEC4: 4, MAT4: 16 };
 
 /** Concatenate the parts, followed by an image that has a view only. */
 export function pack(

@@ -2,7 +2,9 @@ import { Mesh, type Object3D } from "three";
 import { describe, expect, test } from "vitest";
 import { AvatarError } from "../../src/avatar/error";
 import { AvatarModel } from "../../src/avatar/model";
+import { compressByMeshopt, readFile } from "./compressed-files";
 import { createFigureFile } from "./figure-files";
+import { container } from "./glb-container";
 
 describe("a parsed model", () => {
   test("has the author's name or the file's, and a node per bone", async () => {
@@ -37,6 +39,50 @@ describe("a parsed model", () => {
       title: "File damaged",
     });
     await expect(AvatarModel.parse(new ArrayBuffer(8), "mine")).rejects.toBeInstanceOf(AvatarError);
+  });
+
+  test("compressed by meshopt has the bones and vertices of the original", async () => {
+    const original = createFigureFile({ vrm: 1 });
+    const compressed = await compressByMeshopt(original);
+    expect(compressed.length).toBeLessThan(original.length);
+    const [a, b] = await Promise.all([original, compressed].map((file) => AvatarModel.parse(file.buffer, "mine")));
+    expect(b.rest.soleHeight).toBeCloseTo(a.rest.soleHeight, 3);
+    for (const [bone, { position }] of a.rest.bones)
+      expect(b.rest.bones.get(bone)?.position.distanceTo(position)).toBeLessThan(1e-6);
+    for (const [hand, length] of a.rest.handLengths) expect(b.rest.handLengths.get(hand)).toBeCloseTo(length, 3);
+  });
+
+  test("with damaged compressed data is rejected", async () => {
+    const compressed = await compressByMeshopt(createFigureFile());
+    const { json, view } = readFile(compressed);
+    const bytes = Uint8Array.from({ length: Number(json.buffers[0].byteLength) }, (_, at) => (at * 37) & 255);
+    expect(view(0).length).toBeGreaterThan(0);
+    await expect(AvatarModel.parse(container(json, bytes).buffer, "mine")).rejects.toMatchObject({
+      name: "AvatarError",
+      title: "File damaged",
+    });
+  });
+
+  test("whose vertices are nowhere is rejected", async () => {
+    const file = createFigureFile();
+    const { json } = readFile(file);
+    new DataView(file.buffer).setFloat32(file.length - Number(json.buffers[0].byteLength) + 12, NaN, true);
+    await expect(AvatarModel.parse(file.buffer, "mine")).rejects.toThrow(/POSITION\[1\] is not finite/);
+  });
+
+  test("whose triangles refer to missing vertices is rejected", async () => {
+    const file = createFigureFile();
+    const { json } = readFile(file);
+    const { byteOffset = 0 } = json.bufferViews[4];
+    const start = file.length - Number(json.buffers[0].byteLength);
+    new DataView(file.buffer).setUint16(start + byteOffset, 65_535, true);
+    await expect(AvatarModel.parse(file.buffer, "mine")).rejects.toThrow(/indices\[0\]/);
+  });
+
+  test("whose limbs are no body's is rejected", async () => {
+    await expect(AvatarModel.parse(createFigureFile({ forearm: 100 }).buffer, "mine")).rejects.toThrow(
+      /LowerArm and leftHand are too far apart/,
+    );
   });
 
   test("whose limbs have no length is rejected", async () => {

@@ -36,6 +36,12 @@ describe("the rest pose", () => {
     expect(ball.z).toBeCloseTo(0.13, 6);
   });
 
+  test("reaches up to the top of the head", async () => {
+    const [plain, tall] = [await restOf({}), await restOf({ headHeight: 0.9, unit: 0.01, lying: true })];
+    expect(tall.topHeight - plain.topHeight).toBeCloseTo(0.7, 3);
+    expect(plain.topHeight).toBeCloseTo(positionOf(plain, "head").y + 0.2, 3);
+  });
+
   test("estimates the ball without toes, and hand lengths to the finger tips", async () => {
     const rest = await restOf({ without: ["leftToes", "rightToes"] });
     const [, ball] = rest.solePoints.get("rightFoot") as Vector3[];

@@ -1,5 +1,12 @@
 /** Skeletons with the names that common tools use. */
-import type { NamedNode } from "../../src/avatar/bone-names";
+import { Vector3 } from "three";
+import type { JointTree } from "../../src/avatar/bone-names";
+
+/** A node's name in the file, and the index of its parent; -1 for a root. */
+export interface NamedNode {
+  readonly name: string;
+  readonly parent: number;
+}
 
 type Chains = readonly string[];
 
@@ -95,3 +102,12 @@ export const SKELETONS: Readonly<Record<string, readonly NamedNode[]>> = {
     ]),
   ),
 };
+
+/** Return a skeleton whose joints are all at one place, so that only their names tell something. */
+export function treeOf(nodes: readonly NamedNode[]): JointTree {
+  return {
+    names: nodes.map(({ name }) => name),
+    parents: nodes.map(({ parent }) => parent),
+    positions: nodes.map(() => new Vector3()),
+  };
+}

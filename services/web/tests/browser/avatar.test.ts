@@ -7,6 +7,7 @@ import { expect, test } from "vitest";
 import { mixamoName } from "../avatar/figure-bones";
 import { createFigureFile, type FigureOptions } from "../avatar/figure-files";
 import { findViolations } from "./accessibility";
+import { dropBytes } from "./avatar-drop";
 import { describeInBrowser } from "./browser-suite";
 import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import {
@@ -211,20 +212,6 @@ function leftWrist(page: Page, performer: number): Promise<number[]> {
 
 async function drop(page: Page, name: string, options: FigureOptions): Promise<void> {
   await dropBytes(page, name, [...createFigureFile(options)]);
-}
-
-/** Drop a file with these bytes on the stage. */
-async function dropBytes(page: Page, name: string, bytes: number[]): Promise<void> {
-  await page.evaluate(
-    ({ name, bytes }) => {
-      const dataTransfer = new DataTransfer();
-      dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
-      document
-        .querySelector("#stage")
-        ?.dispatchEvent(new DragEvent("drop", { dataTransfer, bubbles: true, cancelable: true }));
-    },
-    { name, bytes },
-  );
 }
 
 /** Return the largest angle between a limb of an avatar and the same limb of the streamed motion, in degrees. */

@@ -10,6 +10,7 @@ import { createStandardFigure } from "../stage/puppet/figures";
 class FakePerformer implements Performer {
   readonly group = new Group();
   readonly scale = 1;
+  readonly height = 1.75;
   readonly root = new Matrix4();
   readonly ground = 0.1;
   showsReflection = false;

@@ -33,7 +33,8 @@ const BOTTOM_CONTROLS_PX: Partial<Record<Framing, readonly [controls: number, wi
  * without, in metres; share of the picture between feet and sheet; limit of the visible height.
  */
 const HEADER_HEIGHT_PX = 80;
-const [HEIGHT_WITH_HEADROOM_M, STANDING_HEIGHT_M] = [2, 1.75];
+const HEIGHT_WITH_HEADROOM_M = 2;
+export const STANDING_HEIGHT_M = 1.75;
 const FOOT_MARGIN_SHARE = 0.03;
 const MAX_VISIBLE_HEIGHT_M = 9;
 const HALF_FOV_RAD = (13 * Math.PI) / 180;
@@ -70,6 +71,7 @@ export class AudienceCamera {
   /** Current view in the world frame, independent of the window's shape. */
   readonly view: CameraView = createView();
   reducedMotion = false;
+  /** Size of the tallest performer relative to the standard figure. */
   scale = 1;
   /** Distance from the performers, as a multiple of what one performer needs. */
   distanceScale = 1;

@@ -2,6 +2,7 @@
 import { Group, type IUniform, Vector3 } from "three";
 import type { StagedPose } from "../../motion/extension";
 import { type Figure, LIMBS } from "../../motion/skeleton";
+import { STANDING_HEIGHT_M } from "../camera/audience-camera";
 import type { ScreenBox, WorldExtent } from "../camera/screen-box";
 import type { ScreenProjection } from "../camera/screen-projection";
 import type { Performer } from "./performer";
@@ -54,11 +55,20 @@ export class PerformerGroup {
     );
   }
 
+  /** Size relative to the standard figure that the audience's camera has to show: that of the tallest performer. */
+  get tallestScale(): number {
+    return Math.max(...this.#performers.map(({ height }) => height / STANDING_HEIGHT_M));
+  }
+
   /** Return boxes that contain the visible performers in the picture, in CSS pixels. */
   boxes(projection: ScreenProjection): ScreenBox[] {
-    return this.visiblePerformers.flatMap(({ joint, scale }) =>
-      OUTER_JOINTS.map((name) => projection.boxAt(at.setFromMatrixPosition(joint(name)), CLOTHES_EXTENT, scale)),
-    );
+    return this.visiblePerformers.flatMap(({ joint, scale, height }) => {
+      // A large head reaches further up.
+      const up = CLOTHES_EXTENT.up + Math.max(0, height / scale - STANDING_HEIGHT_M);
+      return OUTER_JOINTS.map((name) =>
+        projection.boxAt(at.setFromMatrixPosition(joint(name)), { ...CLOTHES_EXTENT, up }, scale),
+      );
+    });
   }
 
   /** Return the boxes of the visible performers' faces in the picture, in CSS pixels. */

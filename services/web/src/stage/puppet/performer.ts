@@ -11,6 +11,8 @@ export interface Performer {
   readonly figure: Figure;
   /** Size relative to the standard figure of 1.75 m. */
   readonly scale: number;
+  /** Height at rest from the soles to the top of head and hair, in metres. */
+  readonly height: number;
   /** World matrix of the pelvis as drawn: the stage follows it. */
   readonly root: Matrix4;
   /** Height of the floor under the lower foot, in world metres. */

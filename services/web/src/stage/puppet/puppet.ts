@@ -13,6 +13,7 @@ import {
 } from "three";
 import type { StagedPose } from "../../motion/extension";
 import { createWorldTransforms, type Figure, JOINTS, PARENTS, worldTransforms } from "../../motion/skeleton";
+import { STANDING_HEIGHT_M } from "../camera/audience-camera";
 import { ExtendedBones, TRUNK_BONES } from "./extended-bones";
 import { figureScale, restPositions } from "./figure-fit";
 import { floorHeight, handlePosition, type Performer } from "./performer";
@@ -80,6 +81,10 @@ export class Puppet implements Performer {
 
   get root(): Matrix4 {
     return this.#bones[0].matrixWorld;
+  }
+
+  get height(): number {
+    return STANDING_HEIGHT_M * this.scale;
   }
 
   get ground(): number {

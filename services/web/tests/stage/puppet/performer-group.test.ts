@@ -14,7 +14,10 @@ class FakePerformer implements Performer {
   showsReflection = false;
   usesSimpleMaterials = false;
   poses = 0;
-  constructor(readonly figure: Figure) {}
+  constructor(
+    readonly figure: Figure,
+    readonly height = 1.75,
+  ) {}
   apply(): void {
     this.poses++;
   }
@@ -67,6 +70,14 @@ test("a factory replaces only its performer, and applies to the next motion", ()
   // There is no such performer yet.
   group.setPerformerFactory(null, 3);
   expect(group.performers).toHaveLength(2);
+});
+
+test("the tallest performer, with head and hair, is the one to frame", () => {
+  group.setFigures([FIRST]);
+  expect(group.tallestScale).toBe(1);
+  group.setPerformerFactory((figure) => new FakePerformer(figure, 2.8), 1);
+  group.setFigures([FIRST, OTHER]);
+  expect(group.tallestScale).toBeCloseTo(1.6);
 });
 
 test("a performer is visible from its first pose and keeps its last", () => {
