@@ -6,14 +6,15 @@
  * sink.
  */
 import { Group, Matrix4, type Object3D, Quaternion, Vector3 } from "three";
-import { BONES, createHumanoidPose, toHumanoid, tPoseFigure } from "../motion/humanoid";
-import { createWorldTransforms, type Figure, JOINTS, type Pose, worldTransforms } from "../motion/skeleton";
+import type { StagedPose } from "../motion/extension";
+import { BONES, tPoseFigure } from "../motion/humanoid";
+import { createWorldTransforms, type Figure, JOINTS, worldTransforms } from "../motion/skeleton";
 import { figureScale, restPositions, totalLimbLength } from "../stage/puppet/figure-fit";
 import { floorHeight, handlePosition, type Performer } from "../stage/puppet/performer";
 import { SOLE_HEIGHT_M } from "../stage/puppet/standard-figure";
+import { BoneOrientations } from "./bone-orientations";
 import { SimpleMaterials } from "./materials";
 import type { AvatarModel } from "./model";
-import { drivenParent } from "./rest-pose";
 
 /** Bone whose position gives the rest direction of another; other bones keep the file's orientation. */
 const NEXT_BONE: Readonly<Record<string, string>> = Object.fromEntries(
@@ -39,7 +40,7 @@ const LIMB_BONES = ["left", "right"]
 /** Rotation of a node: its own rest, then the streamed rotation, then into its parent's frame. */
 interface BoneDrive {
   node: Object3D;
-  /** Offset into the rotations of the humanoid pose. */
+  /** Offset into the rotations of the driven bones. */
   rotationOffset: number;
   preRotation: Quaternion;
   postRotation: Quaternion;
@@ -54,7 +55,8 @@ export class Avatar implements Performer {
   readonly #model: AvatarModel;
   readonly #materials: SimpleMaterials;
   readonly #drives: BoneDrive[] = [];
-  readonly #humanoidPose = createHumanoidPose();
+  readonly #orientations: BoneOrientations;
+  readonly #rotations: Float64Array;
   readonly #streamedWorld = createWorldTransforms();
   readonly #joints: ReadonlyMap<string, Matrix4>;
   readonly #ankleHeight: number;
@@ -82,6 +84,8 @@ export class Avatar implements Performer {
         distance("leftLowerArm", "leftHand"));
     model.root.scale.setScalar(avatarScale);
     this.height = Math.min(avatarScale * (topHeight - soleHeight), MAX_FRAMED_HEIGHT_M * this.scale);
+    this.#orientations = new BoneOrientations((bone) => model.nodes.has(bone));
+    this.#rotations = new Float64Array(this.#orientations.bones.length * 4);
     this.#alignBones(figure);
 
     const rest = restPositions(figure);
@@ -127,9 +131,10 @@ export class Avatar implements Performer {
     this.#materials.useSimple(on);
   }
 
-  apply(pose: Pose, seconds: number): void {
+  apply(pose: StagedPose, seconds: number): void {
     const { figure, group } = this;
-    const { positions, orientations } = worldTransforms(figure, pose, this.#streamedWorld);
+    const world = worldTransforms(figure, pose, this.#streamedWorld);
+    const { positions, orientations } = world;
     let k = 0;
     for (const matrix of this.#joints.values()) {
       const q = orientations,
@@ -141,7 +146,8 @@ export class Avatar implements Performer {
       );
       k++;
     }
-    const { rotations } = toHumanoid(figure, pose, this.#humanoidPose);
+    const rotations = this.#rotations;
+    this.#orientations.rotations(world, pose.extended ?? null, rotations);
     for (const { node, rotationOffset: at, preRotation, postRotation } of this.#drives) {
       node.quaternion
         .set(rotations[at + 1], rotations[at + 2], rotations[at + 3], rotations[at])
@@ -195,16 +201,18 @@ export class Avatar implements Performer {
     const { bones } = this.#model.rest;
     const { offsets, tips } = tPoseFigure(figure);
     const alignments = new Map<string, Quaternion>();
-    BONES.forEach((bone, at) => {
+    this.#orientations.bones.forEach((bone, at) => {
       const rest = bones.get(bone);
-      const parentBone = drivenParent(bone);
-      const parent = (parentBone && alignments.get(parentBone)) || new Quaternion();
+      const above = this.#orientations.parents[at];
+      const parent = alignments.get(this.#orientations.bones[above] ?? "") ?? new Quaternion();
       let alignment = new Quaternion();
       const target = bones.get(NEXT_BONE[bone] ?? "");
       if (rest && target) {
         const next = BONES.indexOf(NEXT_BONE[bone]);
         const figureDirection =
-          next < 0 ? new Vector3().fromArray(tips, at * 3) : new Vector3().fromArray(offsets, next * 3);
+          next < 0
+            ? new Vector3().fromArray(tips, BONES.indexOf(bone) * 3)
+            : new Vector3().fromArray(offsets, next * 3);
         const direction = target.position.clone().sub(rest.position);
         if (figureDirection.lengthSq() > 0 && direction.lengthSq() > 0)
           alignment.setFromUnitVectors(direction.normalize(), figureDirection.normalize());

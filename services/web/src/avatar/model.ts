@@ -11,6 +11,7 @@ import { AvatarError, fileBroken } from "./error";
 import { type AvatarFile, parseAvatarFile } from "./file";
 import { dimMToonMaterials, simplifyMaterials } from "./materials";
 import { measureRest, type RestMeasurements } from "./rest-pose";
+import { findTrunkBones } from "./trunk-bones";
 
 /** Minimum distance between two bones, as a share of the height: shorter, a bone has no direction. */
 const MIN_BONE_SHARE = 1e-4;
@@ -93,6 +94,8 @@ export class AvatarModel {
   static async #create(gltf: GLTF, { bones, name }: AvatarFile, fallbackName: string): Promise<AvatarModel> {
     const nodes = new Map<string, Object3D>();
     for (const [bone, index] of bones) nodes.set(bone, (await gltf.parser.getDependency("node", index)) as Object3D);
+    // what the file declares comes before its tree
+    for (const [bone, node] of findTrunkBones(nodes)) if (!nodes.has(bone)) nodes.set(bone, node);
     return new AvatarModel(name ?? fallbackName, nodes, (gltf.userData.vrm as VRM | undefined) ?? null, gltf.scene);
   }
 

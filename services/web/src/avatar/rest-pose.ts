@@ -1,6 +1,7 @@
 /** Measurements of a model's rest pose: facing, bone positions, and the points that touch the floor. */
 import { type BufferAttribute, type Group, Mesh, type Object3D, Quaternion, SkinnedMesh, Vector3 } from "three";
-import { BONE_PARENTS, BONES } from "../motion/humanoid";
+import { BONES } from "../motion/humanoid";
+import { DRIVEN_BONES } from "./bone-orientations";
 
 const UP = new Vector3(0, 1, 0);
 /** Bones that give the direction of a hand, besides the driven ones. */
@@ -44,7 +45,7 @@ export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>):
   stand.quaternion.copy(facing);
   stand.updateMatrixWorld(true);
   const bones = new Map<string, RestBone>();
-  for (const bone of [...BONES, ...FINGER_BONES]) {
+  for (const bone of [...DRIVEN_BONES, ...FINGER_BONES]) {
     const node = nodes.get(bone);
     if (node)
       bones.set(bone, {
@@ -72,12 +73,6 @@ export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>):
       SIDES.map((side) => [`${side}Hand`, handLength(side, nodes, clouds.get(`${side}Hand`) ?? [])]),
     ),
   };
-}
-
-/** Return the parent of a driven bone; null for the hips. */
-export function drivenParent(bone: string): string | null {
-  const parent = BONE_PARENTS[BONES.indexOf(bone)];
-  return parent < 0 ? null : BONES[parent];
 }
 
 const SIDES = ["left", "right"] as const;

@@ -25,6 +25,7 @@ const CARRIERS = [
  * root, if there is no joint.
  */
 export function trunkJoints(spineCount: number, count: number): number[] {
+  if (spineCount === 0) return new Array<number>(count).fill(-1);
   if (count === 1) return [spineCount - 1];
   return Array.from({ length: count }, (_, bone) => Math.round((bone * (spineCount - 1)) / (count - 1)));
 }

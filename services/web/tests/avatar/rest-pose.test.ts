@@ -1,7 +1,7 @@
 import { Quaternion, Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { AvatarModel } from "../../src/avatar/model";
-import { drivenParent, type RestMeasurements } from "../../src/avatar/rest-pose";
+import type { RestMeasurements } from "../../src/avatar/rest-pose";
 import { createFigureFile, type FigureOptions } from "./figure-files";
 
 async function restOf(options: FigureOptions): Promise<RestMeasurements> {
@@ -58,14 +58,4 @@ describe("the rest pose", () => {
       (arm?.parentRotation ?? new Quaternion()).angleTo(parent?.rotation ?? new Quaternion(0, 1, 0, 0)),
     ).toBeLessThan(1e-6);
   });
-});
-
-test("arms and head have the spine as parent, and the hips none", () => {
-  expect(["leftUpperArm", "head", "rightFoot", "spine", "hips"].map(drivenParent)).toEqual([
-    "spine",
-    "spine",
-    "rightLowerLeg",
-    "hips",
-    null,
-  ]);
 });
