@@ -28,6 +28,7 @@ from bunraku.wire.messages import (
     TimelineState,
     unpack,
 )
+from tests.motion.extended_source import extended_source, write_source_bvh
 from tests.servers import make_bvh_clip
 from tests.time_limit import HANG_TIMEOUT_S
 
@@ -89,6 +90,38 @@ async def test_stream_without_motion_track_has_no_blocks(server: str, motion: st
         await receive_until(connection, TimelineState)
         await connection.send(Ping(1, 2).pack())
         assert isinstance(await message(connection), Pong)
+
+
+async def test_extensions_are_sent_only_on_request(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
+        uploaded = await http.post(
+            "/v1/motions?filename=dance.bvh", content=write_source_bvh(extended_source(45, seed=5))
+        )
+        motion = uploaded.json()
+    assert motion["tracks"] == ["motion", "extension"]
+    received: dict[str, set[int]] = {}
+    described: dict[str, int] = {}
+    for query in ("", "?extensions=true", "?tracks=motion&extensions=true", "?extensions=false"):
+        tracks, described[query] = set(), 0
+        async with socket(server, f"/v1/motions/{motion['id']}/stream{query}") as connection:
+            # two blocks of each track, and upgrades of some
+            while len(tracks) < (2 if "true" in query else 1) or described[query] == 0:
+                if isinstance(data := await message(connection), Data):
+                    tracks.add(data.track)
+                elif isinstance(data, Description):
+                    described[query] = max(described[query], (data.first or 0) + len(data.tracks))
+            await connection.send(Ping(1, 2).pack())
+            while not isinstance(data := await message(connection), Pong):
+                if isinstance(data, Data):
+                    tracks.add(data.track)
+        received[query] = tracks
+    assert received == {
+        "": {0},
+        "?extensions=true": {0, 1},
+        "?tracks=motion&extensions=true": {0, 1},
+        "?extensions=false": {0},
+    }
+    assert described[""] == 1
 
 
 async def test_http_blocks_equal_stream_blocks_and_are_immutable(server: str, motion: str) -> None:
