@@ -102,7 +102,8 @@ async def test_extensions_are_sent_only_on_request(server: str) -> None:
     received: dict[str, set[int]] = {}
     described: dict[str, int] = {}
     for query in ("", "?extensions=true", "?tracks=motion&extensions=true", "?extensions=false"):
-        tracks, described[query] = set(), 0
+        tracks: set[int] = set()
+        described[query] = 0
         async with socket(server, f"/v1/motions/{motion['id']}/stream{query}") as connection:
             # two blocks of each track, and upgrades of some
             while len(tracks) < (2 if "true" in query else 1) or described[query] == 0:
