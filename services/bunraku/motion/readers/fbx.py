@@ -14,7 +14,7 @@ import ufbx
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.readers.node_motion import Node, NodeMotion, Track, choose_rate, sample_nodes
-from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.readers.takes import choose_take, describe_choice, name_takes
 from bunraku.motion.rotation import Array
 
 MAX_NODES = 1_000
@@ -37,18 +37,14 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
     process: parse in a separate process.
     """
     with _uncollected() as keep:
-        try:
-            scene = keep(ufbx.load_memory(data, **_LOAD_OPTIONS))
-        except (ufbx.UfbxError, ValueError) as error:
-            detail = str(error) or type(error).__name__
-            raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
+        scene = _load_scene(data, keep)
         stacks = [keep(stack) for stack in keep(scene.anim_stacks)]
         if not stacks:
             raise UnreadableMotion(
                 "No animation", "the file has a model, but no animation", hint="export it with its animation"
             )
         curves = [_moving_curves(stack, keep) for stack in stacks]
-        names = [stack.name or f"take {number}" for number, stack in enumerate(stacks, 1)]
+        names = _take_names(stacks)
         chosen = choose_take(names, [len(moving) for moving in curves], take)
         times = [np.array([key.time for key in keep(curve.keyframes)]) for curve in curves[chosen]]
         if not times:
@@ -59,6 +55,27 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
         motion = sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
         _sample_tracks(keep(stacks[chosen].anim), motion, elements)
         return motion
+
+
+def list_fbx_takes(data: bytes) -> list[str]:
+    """Return the names of a file's takes. Raises `UnreadableMotion` if the data is not an FBX file.
+
+    A file that crashes ufbx ends the process.
+    """
+    with _uncollected() as keep:
+        return _take_names([keep(stack) for stack in keep(_load_scene(data, keep).anim_stacks)])
+
+
+def _load_scene(data: bytes, keep: _Keep) -> ufbx.Scene:
+    try:
+        return keep(ufbx.load_memory(data, **_LOAD_OPTIONS))
+    except (ufbx.UfbxError, ValueError) as error:
+        detail = str(error) or type(error).__name__
+        raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
+
+
+def _take_names(stacks: Sequence[ufbx.AnimStack]) -> list[str]:
+    return name_takes(stack.name or f"take {number}" for number, stack in enumerate(stacks, 1))
 
 
 @contextmanager

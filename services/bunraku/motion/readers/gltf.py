@@ -21,7 +21,7 @@ from bunraku.motion.readers.node_motion import (
     choose_rate,
     sample_nodes,
 )
-from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.readers.takes import choose_take, describe_choice, name_takes
 from bunraku.motion.rotation import Array
 
 MAX_NODES = 1_000
@@ -41,7 +41,7 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
         raise UnreadableMotion(
             "No animation", "the file has a model, but no animation", hint="export it with its animation"
         )
-    names = [str(animation.get("name") or f"animation {number}") for number, animation in enumerate(animations, 1)]
+    names = _take_names(animations)
     channels = [_find_channels(file, animation, f"animations[{number}]") for number, animation in enumerate(animations)]
     chosen = choose_take(names, [len({node for node, _ in moved}) for moved in channels], take)
     tracks = _read_tracks(file, animations[chosen], channels[chosen], f"animations[{chosen}]")
@@ -55,6 +55,15 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
         )
     start, end = min(float(each[0]) for each in times), max(float(each[-1]) for each in times)
     return sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
+
+
+def list_gltf_takes(data: bytes) -> list[str]:
+    """Return the names of an asset's animations. Raises `UnreadableMotion` if the data is no glTF asset."""
+    return _take_names(parse_gltf_file(data).items("animations"))
+
+
+def _take_names(animations: list[dict[str, Any]]) -> list[str]:
+    return name_takes(str(item.get("name") or f"animation {number}") for number, item in enumerate(animations, 1))
 
 
 _Channels = dict[tuple[int, str], object]
