@@ -30,7 +30,7 @@ def write_fbx(
     source = source or parse_bvh(export_bvh(smooth_motion(frames=20), units_per_metre=units_per_metre))
     offsets, turns = local_transforms(source)
     before = _from_degrees(np.array(pre_rotation), "XYZ")
-    degrees = _to_degrees(rotation.multiply(rotation.conjugate(before), turns), order)
+    degrees = to_degrees(rotation.multiply(rotation.conjugate(before), turns), order)
     rest = source.rest_positions
     objects: list[str] = []
     connections: list[str] = []
@@ -98,11 +98,11 @@ def _from_degrees(degrees: Array, order: str) -> Array:
 
 
 def _rest_degrees(before: Array, order: str) -> Array:
-    degrees: Array = _to_degrees(rotation.conjugate(before)[None, None], order)[0, 0]
+    degrees: Array = to_degrees(rotation.conjugate(before)[None, None], order)[0, 0]
     return degrees
 
 
-def _to_degrees(turns: Array, order: str) -> Array:
+def to_degrees(turns: Array, order: str) -> Array:
     """Return angles (n, J, 3) about x, y and z, whose rotations in `order`, the first axis first, give `turns`."""
     matrix = rotation.to_matrix(turns)
     first, second, third = ("XYZ".index(name) for name in order)

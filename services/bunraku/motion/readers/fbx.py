@@ -49,10 +49,12 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
         times = [np.array([key.time for key in keep(curve.keyframes)]) for curve in curves[chosen]]
         if not times:
             detail = f"the take {quote_excerpt(names[chosen])} moves nothing"
-            raise UnreadableMotion("Nothing moves", detail, field=names[chosen])
+            hint = "export it with the animation of its joints"
+            raise UnreadableMotion("Nothing moves", detail, field=names[chosen], hint=hint)
         start, end = _find_span(stacks[chosen], times)
         nodes, elements = _read_nodes(scene, keep)
-        motion = sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
+        notes, unit = describe_choice(names, chosen), _read_unit(keep(scene.settings), keep)
+        motion = sample_nodes(nodes, start, end, choose_rate(times), notes, unit)
         _sample_tracks(keep(stacks[chosen].anim), motion, elements)
         return motion
 
@@ -98,6 +100,13 @@ def _uncollected() -> Iterator[_Keep]:
         gc.freeze()
         if was_enabled:
             gc.enable()
+
+
+def _read_unit(settings: ufbx.SceneSettings, keep: _Keep) -> float | None:
+    """Return the metres per unit that the file declares, None if it does not."""
+    declared = {keep(prop).name for prop in keep(keep(settings.props).props)}
+    unit = settings.unit_meters
+    return unit if "UnitScaleFactor" in declared and np.isfinite(unit) and unit > 0.0 else None
 
 
 def _moving_curves(stack: ufbx.AnimStack, keep: _Keep) -> list[ufbx.AnimCurve]:
