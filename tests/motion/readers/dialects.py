@@ -93,9 +93,11 @@ def check(case: Reads | Refused) -> None:
     sentences = " ".join(analysis.assumptions)
     for note in case.notes:
         assert note in sentences
+    plain = plain_analysis()
+    thighs = [each.motion.figure.offsets[JOINT_INDEX["l_knee"]] for each in (analysis, plain)]
+    assert np.linalg.norm(thighs[0]) == pytest.approx(case.size * np.linalg.norm(thighs[1]), rel=0.01)
     if case.apart_mm is None:
         return
-    plain = plain_analysis()
     assert analysis.source_joints.keys() == plain.source_joints.keys()
     # every so many frames are at the times of the plain ones
     step = max(round(case.fps / FPS), 1)
