@@ -14,7 +14,9 @@ from typer.testing import CliRunner
 from bunraku import __version__
 from bunraku.cli import app
 from tests.audio import make_tone, write_audio
+from tests.motion.readers.sources import write_zip
 from tests.patient_viewer import use_patient_viewers
+from tests.servers import make_bvh_clip
 
 RUN = CliRunner()
 
@@ -90,6 +92,20 @@ def test_tables_are_printed_without_json(server: str, clip_file: Path) -> None:
     assert "18 of 18" in shown.stdout
     assert "kbit/s" in shown.stdout
     assert clip_file.stem in RUN.invoke(app, ["list", "--server", server]).stdout
+
+
+def test_upload_stores_all_takes_unless_one_is_named(server: str, tmp_path: Path) -> None:
+    path = tmp_path / "takes.zip"
+    path.write_bytes(write_zip({"a.bvh": make_bvh_clip(0.5, 51), "b.bvh": make_bvh_clip(0.5, 52), "c.bvh": b"x"}))
+    shown = RUN.invoke(app, ["upload", str(path), "--server", server])
+    assert shown.exit_code == 0, shown.output
+    assert "takes \N{EN DASH} a.bvh" in shown.stdout
+    assert "takes \N{EN DASH} b.bvh" in shown.stdout
+    assert "Left out: c.bvh: Not a BVH file" in shown.stderr
+    stored = json.loads(RUN.invoke(app, ["upload", str(path), "--server", server, "--json"]).stdout)
+    assert (len(stored["items"]), stored["skipped"][0]["take"], stored["pending"]) == (2, "c.bvh", [])
+    one = RUN.invoke(app, ["upload", str(path), "--server", server, "--take", "b.bvh", "--json"])
+    assert json.loads(one.stdout) == stored["items"][1]
 
 
 def test_failures_print_an_error_without_traceback(server: str, tmp_path: Path) -> None:

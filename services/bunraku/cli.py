@@ -8,7 +8,7 @@ import sys
 import webbrowser
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from rich.text import Text
@@ -40,6 +40,9 @@ from bunraku.terminal import (
     resolve_stream_url,
     run_request,
 )
+
+if TYPE_CHECKING:
+    from bunraku.client.api import Client
 
 app = typer.Typer(
     help="Stream humanoid motion to browsers, and let viewers control the limbs.",
@@ -133,17 +136,31 @@ def upload(
     server: ServerOption = DEFAULT_SERVER,
     token: TokenOption = None,
     as_json: JsonOption = False,
-    take: Annotated[str | None, typer.Option(help="Motion of a file that has several.")] = None,
+    take: Annotated[str | None, typer.Option(help="Only this motion of a file that has several.")] = None,
 ) -> None:
-    """Upload a motion file (BVH, FBX, GLB, VRMA, or a zip archive) and print the analysed motion."""
+    """Upload a motion file (BVH, FBX, GLB, VRMA, or a zip archive) and print the analysed motions.
+
+    With --json, a file of one motion gives that motion, and a file of several an object with its `items`.
+    """
+
+    async def send(client: Client, *callbacks: Any) -> dict[str, Any]:
+        if take is None:
+            return await client.upload_takes(file, *callbacks)
+        return {"items": [await client.upload(file, *callbacks, take=take)], "skipped": [], "pending": []}
+
+    stored = _send_file(file, server, token, as_json, send)
+    is_single = len(stored["items"]) == 1 and not stored["skipped"] and not stored["pending"]
+    if as_json:
+        out.print_json(data=stored["items"][0] if is_single else stored)
+    elif is_single:
+        _print_motion(stored["items"][0])
+    else:
+        _print_takes(stored)
+
+
+def _print_motion(motion: dict[str, Any]) -> None:
     from rich.table import Table
 
-    motion = _send_file(
-        file, server, token, as_json, lambda client, *callbacks: client.upload(file, *callbacks, take=take)
-    )
-    if as_json:
-        out.print_json(data=motion)
-        return
     table = Table(show_header=False, box=None)
     table.add_row("id", motion["id"])
     table.add_row("length", f"{motion['duration']:.2f} s, {motion['frames']} frames at {motion['fps']:g} fps")
@@ -156,6 +173,23 @@ def upload(
     for assumption in motion["guessed"]:
         table.add_row("assumed", assumption)
     out.print(table)
+
+
+def _print_takes(stored: dict[str, Any]) -> None:
+    """Print what became of the takes of a file: a line for each motion, and for each take without one the reason."""
+    from rich.table import Table
+
+    table = Table("id", "name", "length", box=None)
+    for motion in stored["items"]:
+        table.add_row(motion["id"], motion["name"], f"{motion['duration']:.2f} s")
+    if stored["items"]:
+        out.print(table)
+    for skipped in stored["skipped"]:
+        reason = ": ".join(skipped[name] for name in ("take", "title", "detail") if skipped[name])
+        err.print(f"Left out: {reason}" + (f" ({skipped['hint']})" if skipped["hint"] else ""), soft_wrap=True)
+    if stored["pending"]:
+        names = ", ".join(stored["pending"])
+        err.print(f"The server goes on with {names}; they follow in the library.", soft_wrap=True)
 
 
 @app.command()

@@ -7,7 +7,7 @@ import random
 import sys
 
 from tests.fuzz.corruption import corrupt
-from tests.fuzz.reader_targets import fbx, load_fbx_seed
+from tests.fuzz.reader_targets import fbx, load_fbx_seeds
 
 MAX_EDITS = 8
 DIGITS = b"0123456789.,-"
@@ -16,8 +16,9 @@ DIGITS = b"0123456789.,-"
 
 def main() -> None:
     seed, count = map(int, sys.argv[1:])
-    chance, whole, counts = random.Random(seed), load_fbx_seed(), [0, 0]
+    chance, seeds, counts = random.Random(seed), load_fbx_seeds(), [0, 0]
     for _ in range(count):
+        whole = chance.choice(seeds)
         values = DIGITS if chance.random() < 0.7 else range(256)
         edits = [(chance.randrange(len(whole)), chance.choice(values)) for _ in range(chance.randrange(MAX_EDITS))]
         kept = chance.choice((1.0, 1.0, 1.0, chance.random()))

@@ -16,7 +16,8 @@ from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.readers.gltf import parse_gltf
 from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.source_motion import SourceMotion
-from tests.motion.readers.fbx_writer import write_fbx
+from tests.motion.readers.fbx_tree import MAGIC, to_binary
+from tests.motion.readers.fbx_writer import build_fbx, write_fbx
 from tests.motion.readers.sources import pack_glb, unpack_glb, write_acclaim, write_glb, write_zip
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
 
@@ -75,7 +76,7 @@ def archive(data: bytes) -> bool:
 
 def fbx(data: bytes) -> bool:
     """Read an FBX file."""
-    return _accepts(lambda given: read_motion(b"; FBX 7.4.0\n" + given), data)
+    return _accepts(read_motion, data if data.startswith(MAGIC) else b"; FBX 7.4.0\n" + data)
 
 
 TARGETS: list[Callable[[bytes], bool]] = [bvh, gltf, acclaim, archive]
@@ -98,6 +99,7 @@ def load_seeds() -> list[tuple[int, bytes]]:
         (0, clip),
         (1, glb),
         (1, pack_glb(document, binary)),
+        (1, write_sparse_glb(source)),
         (2, asf + SEPARATOR + amc),
         (3, write_zip({"a.bvh": clip})),
         (3, write_zip({"03.asf": asf, "03_01.amc": amc})),
@@ -105,6 +107,20 @@ def load_seeds() -> list[tuple[int, bytes]]:
     ]
 
 
-def load_fbx_seed() -> bytes:
-    """Return a file that `fbx` accepts."""
-    return write_fbx()
+def write_sparse_glb(source: SourceMotion) -> bytes:
+    """Return a file whose first rotations are a sparse accessor."""
+    document, binary = unpack_glb(write_glb(source))
+    view = document["accessors"][1]["bufferView"]
+    document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": 2})
+    document["accessors"][1]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": len(document["bufferViews"]) - 1, "componentType": 5123},
+        "values": {"bufferView": view},
+    }
+    return pack_glb(document, binary + b"\1\0")
+
+
+def load_fbx_seeds() -> list[bytes]:
+    """Return files that `fbx` accepts: in ASCII, and in binary with offsets of 32 and of 64 bits."""
+    tree = build_fbx(parse_bvh(export_bvh(smooth_motion(frames=5))), pre_rotation=(10.0, 20.0, 30.0))
+    return [write_fbx(), to_binary(tree, 7400), to_binary(tree, 7700, compress=True)]

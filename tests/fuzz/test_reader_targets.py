@@ -15,7 +15,7 @@ from hypothesis import given, settings
 
 from tests.fuzz.corruption import hostile_inputs
 from tests.fuzz.guided import REPOSITORY, RUNS, TIMEOUT_S, run_guided
-from tests.fuzz.reader_targets import DICTIONARY, TARGETS, fbx, load_fbx_seed, load_seeds
+from tests.fuzz.reader_targets import DICTIONARY, TARGETS, fbx, load_fbx_seeds, load_seeds
 
 EXAMPLES = 500
 FBX_INPUTS_PER_PROCESS = 2_500
@@ -30,8 +30,8 @@ def test_seeds_are_accepted(seed: tuple[int, bytes]) -> None:
     assert TARGETS[seed[0]](seed[1])
 
 
-def test_fbx_seed_is_accepted() -> None:
-    assert fbx(load_fbx_seed())
+def test_fbx_seeds_are_accepted() -> None:
+    assert all(fbx(seed) for seed in load_fbx_seeds())
 
 
 @pytest.mark.parametrize("number", range(len(TARGETS)), ids=NAMES)

@@ -154,6 +154,13 @@ async def test_invalid_query_gets_a_problem(server: str, path: str) -> None:
     assert response.json()["field"] in ("limit", "cursor")
 
 
+async def test_one_take_and_all_takes_exclude_each_other(server: str) -> None:
+    async with httpx2.AsyncClient(base_url=server, timeout=HANG_TIMEOUT_S) as http:
+        for query in ({"takes": "all", "take": "walk"}, {"takes": "some"}):
+            response = await http.post("/v1/motions", params={"filename": "a.bvh", **query}, content=VALID_CLIP)
+            assert response.status_code == 422
+
+
 async def test_upload_requires_a_filename(server: str) -> None:
     async with httpx2.AsyncClient(base_url=server) as http:
         response = await http.post("/v1/motions", content=b"x")

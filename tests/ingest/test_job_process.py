@@ -13,8 +13,10 @@ import pytest
 from bunraku.ingest import job_process
 from bunraku.ingest.job_process import JobKind
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.motion.readers.takes import TakeList
 from bunraku.runtime import worker_process
 from bunraku.runtime.worker_message import send_message
+from tests.motion.readers.fbx_writer import write_fbx
 from tests.servers import make_bvh_clip
 from tests.time_limit import HANG_TIMEOUT_S
 
@@ -23,7 +25,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(0.5))
     shares: list[float] = []
-    result = await job_process.run_job(JobKind.MOTION, ("m1", source, None), HANG_TIMEOUT_S, shares.append)
+    result = await job_process.run_job(JobKind.MOTION, ("m1", source, None, False), HANG_TIMEOUT_S, shares.append)
     assert isinstance(result, JobResult)
     assert result.description["frames"] == 15
     assert shares == sorted(set(shares))
@@ -32,7 +34,7 @@ async def test_job_encodes_a_motion_in_another_process(tmp_path: Path) -> None:
 
 
 async def test_crashed_job_is_a_rejection(tmp_path: Path) -> None:
-    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing", None), HANG_TIMEOUT_S)
+    result = await job_process.run_job(JobKind.MOTION, ("m1", tmp_path / "missing", None, False), HANG_TIMEOUT_S)
     assert isinstance(result, JobRejection)
     assert result.hint
 
@@ -42,7 +44,7 @@ async def test_cancelled_job_is_killed(tmp_path: Path) -> None:
     source.write_bytes(make_bvh_clip(60.0))
     encoding = asyncio.Event()
     job = asyncio.create_task(
-        job_process.run_job(JobKind.MOTION, ("m1", source, None), HANG_TIMEOUT_S, lambda _: encoding.set())
+        job_process.run_job(JobKind.MOTION, ("m1", source, None, False), HANG_TIMEOUT_S, lambda _: encoding.set())
     )
     await encoding.wait()
     job.cancel()
@@ -54,7 +56,7 @@ async def test_cancelled_job_is_killed(tmp_path: Path) -> None:
 async def test_job_is_killed_at_its_time_limit(tmp_path: Path) -> None:
     source = tmp_path / "source"
     source.write_bytes(make_bvh_clip(20.0))
-    rejected = await job_process.run_job(JobKind.MOTION, ("m1", source, None), 0.001)
+    rejected = await job_process.run_job(JobKind.MOTION, ("m1", source, None, False), 0.001)
     assert isinstance(rejected, JobRejection)
     assert "long" in rejected.title
 
@@ -91,3 +93,13 @@ async def test_hostile_worker_is_a_rejection(
     assert isinstance(result, JobRejection)
     assert result.title.startswith(title)
     assert not multiprocessing.active_children()
+
+
+async def test_takes_are_listed_in_another_process(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(write_fbx(takes=("walk", "run")))
+    assert await job_process.list_takes(source, 1, HANG_TIMEOUT_S) == TakeList(["walk"], 2)
+    source.write_bytes(b"PK\x03\x04" + bytes(100))
+    rejected = await job_process.list_takes(source, 1, HANG_TIMEOUT_S)
+    assert isinstance(rejected, JobRejection)
+    assert rejected.title == "Broken archive"

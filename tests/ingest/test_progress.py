@@ -39,6 +39,9 @@ def test_stage_starts_with_share_zero() -> None:
     progress.advance_to("encoding", 0.5)
     progress.advance_to("waiting")
     assert (progress.stage, progress.share) == ("waiting", 0.0)
+    assert (progress.take, progress.takes) == (1, 1)
+    progress.begin_take(2, 3)
+    assert (progress.take, progress.takes, progress.stage) == (2, 3, "waiting")
 
 
 async def test_shares_rise_while_an_upload_is_encoded(server: str) -> None:

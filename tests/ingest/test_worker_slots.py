@@ -107,16 +107,18 @@ async def test_jobs_are_counted_by_outcome(tmp_path: Path) -> None:
     slots, source = WorkerSlots(2, count().__next__), tmp_path / "source"
     source.write_bytes(make_bvh_clip(0.5))
     seen = []
-    await slots.run_job(JobKind.MOTION, ("m1", source, None), HANG_TIMEOUT_S, lambda _: seen.append(slots.running_jobs))
+    await slots.run_job(
+        JobKind.MOTION, ("m1", source, None, False), HANG_TIMEOUT_S, lambda _: seen.append(slots.running_jobs)
+    )
     assert set(seen) == {1}
     assert isinstance(
-        await slots.run_job(JobKind.MOTION, ("m1", tmp_path / "missing", None), HANG_TIMEOUT_S), JobRejection
+        await slots.run_job(JobKind.MOTION, ("m1", tmp_path / "missing", None, False), HANG_TIMEOUT_S), JobRejection
     )
     assert outcome_counts(slots) == {("make", "made"): 1, ("make", "refused"): 1}
     source.write_bytes(make_bvh_clip(60.0))
     encoding = asyncio.Event()
     job = asyncio.create_task(
-        slots.run_job(JobKind.MOTION, ("m1", source, None), HANG_TIMEOUT_S, lambda _: encoding.set())
+        slots.run_job(JobKind.MOTION, ("m1", source, None, False), HANG_TIMEOUT_S, lambda _: encoding.set())
     )
     await encoding.wait()
     job.cancel()

@@ -65,6 +65,22 @@ class Client:
         query = {} if take is None else {"take": take}
         return await self._upload_file(path, "/v1/motions", progress, on_stage, query)
 
+    async def upload_takes(
+        self,
+        path: Path,
+        progress: Callable[[int, int], None] | None = None,
+        on_stage: Callable[[str, float], None] | None = None,
+    ) -> dict[str, Any]:
+        """Upload a motion file and wait until each of its takes can be watched; a file may have 64.
+
+        Return the motions as `items`, the takes that were not stored as `skipped` (`take`, `title`, `detail`, `hint`),
+        and as `pending` the names of those that the server stores later because they would have delayed the answer.
+        The callbacks are those of `upload`; shares of stages are those of all takes together.
+        """
+        stored = await self._upload_file(path, "/v1/motions", progress, on_stage, {"takes": "all"})
+        # a server of an older release stores one take
+        return stored if "items" in stored else {"items": [stored], "skipped": [], "pending": []}
+
     async def add_audio(
         self,
         motion: str,
@@ -242,7 +258,8 @@ class Client:
             with contextlib.suppress(ServerProblem, httpx2.TransportError):
                 progress = await self._request("GET", f"/v1/uploads/{upload}")
                 if progress["stage"] != "receiving":
-                    on_stage(progress["stage"], progress["share"])
+                    done = progress.get("take", 1) - 1 + progress["share"]
+                    on_stage(progress["stage"], done / progress.get("takes", 1))
 
     async def _request(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         response = await self._http.request(method, path, **options)

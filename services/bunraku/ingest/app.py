@@ -5,7 +5,8 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
-from typing import Annotated, Any
+from functools import partial
+from typing import Annotated, Any, Literal
 
 from fastapi import Depends, FastAPI, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
@@ -29,6 +30,7 @@ from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.recording import RecordingOperation
 from bunraku.ingest.scene import SceneOperation
+from bunraku.ingest.takes import TakesOperation, create_takes_job
 from bunraku.ingest.upload import UploadReceiver
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.recording_request import RECORDING_SUBJECT
@@ -56,7 +58,9 @@ def create_app(context: ServiceContext) -> FastAPI:
     performers = PerformersOperation(context, worker_slots)
     recordings = RecordingOperation(context, worker_slots)
     performances = PerformanceOperation(context, worker_slots)
-    job_queue = JobQueue(context, worker_slots, {"motion": motions.run_job, "audio": soundtracks.run_job})
+    takes_operation = TakesOperation(context, worker_slots, motions)
+    handlers = {"motion": motions.run_job, "takes": takes_operation.run_job, "audio": soundtracks.run_job}
+    job_queue = JobQueue(context, worker_slots, handlers)
     uploads = UploadReceiver(context, job_queue)
 
     @asynccontextmanager
@@ -82,19 +86,39 @@ def create_app(context: ServiceContext) -> FastAPI:
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
     async def upload(
-        request: Request, filename: Filename, upload: UploadName = None, take: TakeName = None
+        request: Request,
+        filename: Filename,
+        upload: UploadName = None,
+        take: TakeName = None,
+        takes: Literal["all"] | None = None,
     ) -> Response:
         """Create a motion from the file in the request body: BVH, FBX, glTF, VRM, VRMA, or a zip archive of them.
 
         Of a file with several takes, the one called `take` is read, by default the largest; `guessed` lists the others.
         An Acclaim motion (AMC) is sent with its skeleton (ASF) in an archive, where files are takes.
 
+        With `takes=all`, each take becomes a motion, at most 64 of a file. The answer then has the motions as `items`,
+        the takes that cannot be stored with the reason as `skipped`, and in `pending` the names of those that follow
+        within minutes, as they would have delayed the answer: its status is then 202.
+
         Uploading the same bytes again returns the same motion with 200. With a random name in `upload`,
         `GET /v1/uploads/{upload}` reports the progress meanwhile.
         """
         subject = access_of(request).subject
+        if takes is not None:
+            if take is not None:
+                raise ProblemError(
+                    422, "Contradiction", "take and takes=all exclude each other", field="take", hint="leave one out"
+                )
+            stored = await uploads.receive(
+                request,
+                upload,
+                lambda digest: create_takes_job(digest, filename, subject),
+                partial(takes_operation.receive, job_queue),
+            )
+            return JSONResponse(stored.to_json(), stored.status)
         outcome = await uploads.receive(
-            request, upload, lambda digest: create_motion_job(digest, filename, subject, take)
+            request, upload, lambda digest: create_motion_job(digest, filename, subject, take), job_queue.run_job
         )
         return _stored_response(outcome)
 
@@ -109,7 +133,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         subject = access_of(request).subject
         await soundtracks.require_motion(motion)
         outcome = await uploads.receive(
-            request, upload, lambda digest: create_audio_job(motion, digest, filename, subject)
+            request, upload, lambda digest: create_audio_job(motion, digest, filename, subject), job_queue.run_job
         )
         return _stored_response(outcome)
 

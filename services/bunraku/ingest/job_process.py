@@ -5,13 +5,17 @@ The modules that jobs need are imported only in the server process from which wo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from enum import StrEnum
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
 
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.motion.readers.takes import TakeList
 from bunraku.runtime import worker_process
 from bunraku.runtime.worker_process import MAX_MEMORY_BYTES, WorkerFailed, WorkerOutOfMemory, WorkerTimedOut
+
+Result = TypeVar("Result")
 
 
 class JobKind(StrEnum):
@@ -98,11 +102,25 @@ async def run_job(
 
     `on_progress` receives the completed share, 0..1. Cancellation kills the process.
     """
+    return await _run(kind, _call_job, (kind, *arguments), timeout_s, on_progress, (JobResult, JobRejection))
+
+
+async def list_takes(path: Path, limit: int, timeout_s: float) -> TakeList | JobRejection:
+    """Return the first `limit` takes of a motion file, read in a worker process, or a rejection as `run_job` does."""
+    return await _run(JobKind.MOTION, _call_list_takes, (path, limit), timeout_s, None, (TakeList, JobRejection))
+
+
+async def _run(
+    kind: JobKind,
+    function: Callable[..., Result | JobRejection],
+    arguments: tuple[Any, ...],
+    timeout_s: float,
+    on_progress: Callable[[float], None] | None,
+    records: Collection[type],
+) -> Result | JobRejection:
     texts = _FAILURE_TEXTS[kind]
     try:
-        return await worker_process.run_in_worker(
-            _call_job, (kind, *arguments), timeout_s, on_progress, (JobResult, JobRejection)
-        )
+        return await worker_process.run_in_worker(function, arguments, timeout_s, on_progress, records)
     except WorkerTimedOut:
         detail = f"reading and encoding exceeded {timeout_s:g} s"
         return JobRejection("Takes too long", detail, hint=texts.reduce_hint)
@@ -111,6 +129,13 @@ async def run_job(
         return JobRejection(texts.too_large_title, detail, hint=texts.reduce_hint)
     except WorkerFailed:
         return JobRejection(texts.failed_title, texts.failed_detail, hint=texts.report_hint)
+
+
+def _call_list_takes(path: Path, limit: int) -> TakeList | JobRejection:
+    """List takes, in the worker process."""
+    from bunraku.ingest.jobs.motion import list_file_takes
+
+    return list_file_takes(path, limit)
 
 
 def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:

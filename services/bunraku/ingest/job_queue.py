@@ -39,8 +39,8 @@ MAX_ATTEMPTS = 3
 
 JobDetails = dict[str, Any]
 """Parameters of a job as JSON; `kind` selects the handler."""
-JobHandler = Callable[[JobDetails, Path, UploadProgress], Awaitable[StoreOutcome]]
-"""Function that stores the motion of a job's details and uploaded file; it raises `ProblemError` for a bad file."""
+JobHandler = Callable[[JobDetails, Path, UploadProgress], Awaitable[Any]]
+"""Function that stores the motions of a job's details and uploaded file; it raises `ProblemError` for a bad file."""
 
 _log = logging.getLogger(__name__)
 
@@ -91,9 +91,10 @@ class JobQueue:
         """Number of abandoned jobs that this replica has resumed."""
 
     async def run_job(self, job: UploadJob, path: Path, progress: UploadProgress) -> StoreOutcome:
-        """Persist a job, run its handler on the file at `path` and remove the job."""
+        """Persist a job of one motion, run its handler on the file at `path` and remove the job."""
         async with self.persist_job(job, path):
-            return await self._handlers[job.details["kind"]](job.details, path, progress)
+            outcome: StoreOutcome = await self._handlers[job.details["kind"]](job.details, path, progress)
+            return outcome
 
     @asynccontextmanager
     async def persist_job(self, job: UploadJob, path: Path) -> AsyncIterator[None]:

@@ -10,6 +10,8 @@ from bunraku.runtime.problem import ProblemError
 
 NOTHING_TO_KEEP = "Nothing to keep"
 """Title of the rejection of a recording or performance that has no motion."""
+NOTHING_MOVES = "Nothing moves"
+"""Title of the rejection of a take without movement."""
 MAX_TEXT_CHARACTERS = 500
 """Maximum length of a text in a motion's description."""
 
@@ -41,13 +43,18 @@ def require_result(outcome: JobResult | JobRejection, **problem_members: str) ->
     The description may quote the uploaded file, for example its names of joints: its texts are cleaned.
     """
     if isinstance(outcome, JobRejection):
-        raise ProblemError(
-            422,
-            outcome.title,
-            outcome.detail,
-            line=outcome.line,
-            field=outcome.field,
-            hint=outcome.hint,
-            **problem_members,
-        )
+        raise rejection_problem(outcome, **problem_members)
     return replace(outcome, description=clean_document(outcome.description, MAX_TEXT_CHARACTERS))
+
+
+def rejection_problem(rejection: JobRejection, **problem_members: str) -> ProblemError:
+    """Return the problem (422) of a rejection, with further `problem_members`."""
+    return ProblemError(
+        422,
+        rejection.title,
+        rejection.detail,
+        line=rejection.line,
+        field=rejection.field,
+        hint=rejection.hint,
+        **problem_members,
+    )

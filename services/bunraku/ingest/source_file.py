@@ -23,6 +23,8 @@ class SourceFile:
     """Subject that uploaded it."""
     take: str | None = None
     """Motion that is meant, of those in the file."""
+    is_one_of_several: bool = False
+    """Whether the other motions of the file are meant too: one without movement is then rejected."""
 
 
 def clean_filename(filename: str) -> str:

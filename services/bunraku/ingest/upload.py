@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from pathlib import Path
+from typing import Any, TypeVar
 
 from starlette.requests import ClientDisconnect, Request
 
@@ -13,7 +14,7 @@ from bunraku.http.admission import AdmissionLimit, holder_of
 from bunraku.http.disconnect import run_until_disconnect
 from bunraku.http.large_body import write_body
 from bunraku.ingest.job_queue import JobQueue, UploadJob
-from bunraku.ingest.persistence import StoreOutcome, check_quota
+from bunraku.ingest.persistence import check_quota
 from bunraku.ingest.progress import UploadProgress
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.insufficient_storage import translate_disk_full
@@ -25,8 +26,11 @@ MAX_UPLOADS = 64
 MAX_UPLOADS_PER_HOLDER = 8
 """Uploads of one subject, or of one address without a subject, at the same time."""
 
+Outcome = TypeVar("Outcome")
 JobFactory = Callable[[bytes], UploadJob]
 """Function that describes the job for a file, from its SHA-256 digest."""
+JobRunner = Callable[[UploadJob, Path, UploadProgress], Coroutine[Any, Any, Outcome]]
+"""Function that persists and runs a job on a received file."""
 
 
 class UploadReceiver:
@@ -50,8 +54,10 @@ class UploadReceiver:
         """Return the progress of an upload of a subject by the name that its client chose, None if there is none."""
         return self._progress.get((subject, upload))
 
-    async def receive(self, request: Request, upload: str | None, create_job: JobFactory) -> StoreOutcome:
-        """Receive the file in the request's body, run its job and return the stored motion.
+    async def receive(
+        self, request: Request, upload: str | None, create_job: JobFactory, run_job: JobRunner[Outcome]
+    ) -> Outcome:
+        """Receive the file in the request's body, run its job and return what it stored.
 
         Meanwhile `get_progress` reports on it by the name `upload`, to the same subject only. Raise `ProblemError`, or
         `ClientDisconnect` if the client disconnects: the job is then cancelled and discarded.
@@ -66,16 +72,18 @@ class UploadReceiver:
                 raise ProblemError(409, "Name in use", detail, field="upload")
             progress = self._progress[key] = UploadProgress()
             try:
-                return await self._receive(request, create_job, progress)
+                return await self._receive(request, create_job, run_job, progress)
             finally:
                 del self._progress[key]
 
-    async def _receive(self, request: Request, create_job: JobFactory, progress: UploadProgress) -> StoreOutcome:
+    async def _receive(
+        self, request: Request, create_job: JobFactory, run_job: JobRunner[Outcome], progress: UploadProgress
+    ) -> Outcome:
         with translate_disk_full("this server"), temporary_folder("upload") as folder:
             path = folder / "source"
             job = create_job(await self._write_body(request, path, progress))
             try:
-                return await run_until_disconnect(request, self._job_queue.run_job(job, path, progress))
+                return await run_until_disconnect(request, run_job(job, path, progress))
             except ClientDisconnect:
                 await self._job_queue.discard_job(job.id)
                 raise

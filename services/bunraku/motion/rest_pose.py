@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.motion import rotation
+from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import SourceMotion
@@ -20,6 +21,12 @@ REFERENCE_LEG_M = 0.82
 """Leg of an adult, hip to ankle, from which the unit is detected."""
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "CMU unit (0.45 scaled inch)": 0.0254 / 0.45}
 """Metres per unit. The CMU database uses inches scaled by 0.45 (mocap.cs.cmu.edu, FAQ)."""
+UNIT_NAMES = {value: name for name, value in METRES_PER_UNIT.items()} | {0.1: "dm", 0.3048: "foot", 0.9144: "yard"}
+"""Names of units that files declare, by metres per unit."""
+MIN_DECLARED_LEG_M, MAX_DECLARED_LEG_M = 0.14, 1.43
+"""Legs of bodies of 0.3 m and of 3 m. Beyond them, the unit that a file declares is taken for a mistake."""
+MIN_BONE_SHARE = 0.02
+"""Shortest thigh or shin, as a share of a leg."""
 MAX_LEG_LOG_RATIO = np.log(1.55)
 """Largest deviation of a leg from `REFERENCE_LEG_M`, as the logarithm of a ratio: a child's to a giant's."""
 MAX_SAMPLED_FRAMES = 256
@@ -91,10 +98,11 @@ def find_rest_pose(
 ) -> RestPose:
     """Detect the rest pose of `source`; `joints` maps H-Anim joints to source indices.
 
-    `position` (n, J, 3) and `orientation` (n, J, 4) are the sampled `frames` in the source's unit and axes.
+    `position` (n, J, 3) and `orientation` (n, J, 4) are the sampled `frames` in the source's unit and axes. Raises
+    `UnreadableMotion` if the legs have no length.
     """
     guessed: list[str] = []
-    unit, scale = _detect_unit(position, joints, guessed)
+    unit, scale = _detect_unit(position, joints, source, guessed)
     at_rest = source.rest_positions
     up = rotation.normalise(_body_up(position, joints).mean(axis=0))
     if _is_standing(at_rest, joints):
@@ -152,20 +160,49 @@ def _nearest_axis(direction: Array) -> Array:
     return axis
 
 
-def _detect_unit(position: Array, joints: dict[str, int], assumptions: list[str]) -> tuple[str, float]:
-    """Return the unit in which a leg is nearest to `REFERENCE_LEG_M`, and metres per unit."""
+def _detect_unit(
+    position: Array, joints: dict[str, int], source: SourceMotion, assumptions: list[str]
+) -> tuple[str, float]:
+    """Return the unit and metres per unit: the declared one, unless it makes a body too small or too large.
+
+    Otherwise it is the unit in which a leg is nearest to `REFERENCE_LEG_M`. Raises `UnreadableMotion` if a bone of a
+    leg has no length.
+    """
+    names, declared = source.names, source.metres_per_unit
     bones = [("hip", "knee"), ("knee", "ankle")] if _lowest_leg_joint(joints) == "ankle" else [("hip", "knee")] * 2
-    leg = 0.5 * sum(
-        float(np.median(np.linalg.norm(position[:, joints[f"{s}_{a}"]] - position[:, joints[f"{s}_{b}"]], axis=-1)))
+    lengths = {
+        f"{s}_{b}": float(
+            np.median(np.linalg.norm(position[:, joints[f"{s}_{a}"]] - position[:, joints[f"{s}_{b}"]], axis=-1))
+        )
         for s in "lr"
-        for a, b in bones
-    )
+        for a, b in dict.fromkeys(bones)
+    }
+    leg = sum(lengths.values()) / len(lengths) * 2.0
+    shortest = min(lengths, key=lengths.__getitem__)
+    if not lengths[shortest] > MIN_BONE_SHARE * leg:
+        raise UnreadableMotion(
+            "A leg without length",
+            f"{names[joints[shortest]]} is at the place of the joint above it",
+            field=names[joints[shortest]],
+            hint="export the skeleton with the offsets of its joints",
+        )
+    if declared is not None:
+        if MIN_DECLARED_LEG_M <= leg * declared <= MAX_DECLARED_LEG_M:
+            return _name_unit(declared), declared
+        assumptions.append(
+            f"The file says that its unit is {_name_unit(declared)}, in which a leg has {leg * declared:.3g} m; "
+            "another one was taken."
+        )
     name = min(METRES_PER_UNIT, key=lambda unit: abs(np.log(max(leg, 1e-12) * METRES_PER_UNIT[unit] / REFERENCE_LEG_M)))
     if abs(np.log(max(leg, 1e-12) * METRES_PER_UNIT[name] / REFERENCE_LEG_M)) > MAX_LEG_LOG_RATIO:
         assumptions.append(f"The unit is unknown: a leg of {leg:.4g} units was scaled to {REFERENCE_LEG_M} m.")
         return "unknown", REFERENCE_LEG_M / max(leg, 1e-12)
     assumptions.append(f"The unit is {name}: a leg of {leg:.4g} units is {leg * METRES_PER_UNIT[name]:.2f} m.")
     return name, METRES_PER_UNIT[name]
+
+
+def _name_unit(metres: float) -> str:
+    return next((name for unit, name in UNIT_NAMES.items() if abs(unit - metres) < 1e-3 * unit), f"{metres:.4g} m")
 
 
 def _is_standing(position: Array, joints: dict[str, int]) -> bool:

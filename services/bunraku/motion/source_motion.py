@@ -12,6 +12,9 @@ import numpy.typing as npt
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
 
+NTSC_RATES = (24_000 / 1_001, 30_000 / 1_001, 60_000 / 1_001, 120_000 / 1_001)
+"""Frame rates that are called 23.976, 29.97, 59.94 and 119.88."""
+
 
 @dataclass(frozen=True, slots=True)
 class EndSite:
@@ -46,6 +49,10 @@ class SourceMotion(Protocol):
     @property
     def notes(self) -> tuple[str, ...]:
         """Sentences about irregularities."""
+
+    @property
+    def metres_per_unit(self) -> float | None:
+        """Unit of length that the file declares, in metres; None if it declares none."""
 
     @property
     def fps(self) -> float:
@@ -83,6 +90,7 @@ class SampledMotion:
     positions: Array
     orientations: Array
     notes: tuple[str, ...] = ()
+    metres_per_unit: float | None = None
 
     @property
     def joint_lines(self) -> tuple[int | None, ...]:

@@ -8,9 +8,11 @@ import pytest
 
 from bunraku.codec.container import unpack_motion
 from bunraku.codec.extension_track import ExtensionTrack
-from bunraku.ingest.jobs.motion import encode_file
+from bunraku.ingest.jobs.motion import encode_file, list_file_takes
 from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.motion.readers.takes import TakeList
 from tests.motion.extended_source import extended_source, write_source_bvh
+from tests.motion.readers.fbx_writer import write_fbx
 from tests.servers import make_bvh_clip
 
 
@@ -54,3 +56,23 @@ def test_source_with_clavicles_gets_an_extension_that_is_described(tmp_path: Pat
     stored = unpack_motion("m1", result.packed)
     assert isinstance(stored.tracks[1], ExtensionTrack)
     assert stored.tracks[1].block_count == stored.first_track.block_count
+
+
+@pytest.mark.parametrize("frames", [1, 20])
+def test_single_pose_is_rejected_where_motion_is_required(frames: int, tmp_path: Path) -> None:
+    header, _, values = make_bvh_clip(1 / 30).partition(b"Frames: 1")
+    time, row = values.strip().split(b"\n")
+    source = tmp_path / "source"
+    source.write_bytes(b"%sFrames: %d\n%s\n%s\n" % (header, frames, time, b"\n".join([row] * frames)))
+    rejected = encode_file("m1", source, must_move=True)
+    assert isinstance(rejected, JobRejection)
+    assert rejected.title == "Nothing moves"
+    assert isinstance(encode_file("m1", source), JobResult)
+
+
+def test_takes_are_listed(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    source.write_bytes(write_fbx(takes=("walk", "run", "jump")))
+    assert list_file_takes(source, 2) == TakeList(["walk", "run"], 3)
+    source.write_bytes(b"PK\x03\x04" + bytes(100))
+    assert isinstance(list_file_takes(source, 2), JobRejection)

@@ -9,8 +9,9 @@ import pytest
 from bunraku.motion.analysis import Analysis, analyse
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.readers.bvh import Bvh, parse_bvh
-from bunraku.motion.readers.motion_file import read_motion
+from bunraku.motion.readers.motion_file import list_takes, read_motion
 from bunraku.motion.skeleton import world_transforms
+from tests.motion.readers.fbx_writer import write_fbx
 from tests.motion.readers.sources import write_acclaim, write_glb, write_zip
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
 
@@ -116,6 +117,50 @@ def test_file_of_an_archive_is_chosen_by_its_name() -> None:
     long = export_bvh(smooth_motion(frames=30))
     packed = write_zip({"__MACOSX/a.bvh": b"x" * 100_000, "short.bvh": bvh_clip(), "in/long.BVH": long, "b.txt": b"x"})
     assert [read_motion(packed, take).frame_count for take in (None, "short.bvh", "long.BVH")] == [30, 10, 30]
+
+
+SOURCE = parse_bvh(bvh_clip())
+
+
+@pytest.mark.parametrize(
+    ("data", "names"),
+    [
+        (bvh_clip(), []),
+        (b"no motion", []),
+        (write_fbx(), []),
+        (write_glb(SOURCE), []),
+        (write_zip({"a.bvh": bvh_clip()}), []),
+        (write_fbx(takes=("walk", "run")), ["walk", "run"]),
+        (write_glb(SOURCE, animations=("idle", "dance")), ["idle", "dance"]),
+        (write_zip({"a/c.bvh": b"x", "b/c.bvh": b"x"}), ["a/c.bvh", "b/c.bvh"]),
+        (write_zip({"a.zip": b"x", "in/a.bvh": write_zip({"b": b""}), "b.fbx": b"x"}), ["b.fbx", "a.bvh"]),
+        (
+            write_zip({"p/a.fbx": write_fbx(takes=("walk", "run")), "b.glb": write_glb(SOURCE), "c.bvh": b"x"}),
+            ["b.glb", "c.bvh", "a.fbx/walk", "a.fbx/run"],
+        ),
+    ],
+)
+def test_each_listed_take_can_be_chosen(data: bytes, names: list[str]) -> None:
+    assert list_takes(data, 100).names == names
+    for name in names:
+        try:
+            title = type(read_motion(data, name)).__name__
+        except UnreadableMotion as error:
+            title = error.title
+        assert title != "No such take"
+
+
+def test_list_of_takes_is_bounded() -> None:
+    found = list_takes(write_zip({f"{number}.bvh": b"x" for number in range(9)}), 4)
+    assert (found.names, found.count) == (["0.bvh", "1.bvh", "2.bvh", "3.bvh"], 9)
+
+
+def test_animation_of_a_file_of_an_archive_is_chosen_by_both_names() -> None:
+    packed = write_zip({"a.glb": write_glb(SOURCE, animations=("idle", "dance")), "b.bvh": bvh_clip()})
+    assert any("'dance' was read" in note for note in read_motion(packed, "a.glb/dance").notes)
+    assert any("'idle' was read" in note for note in read_motion(packed, "a.glb").notes)
+    with pytest.raises(UnreadableMotion, match="No such take"):
+        read_motion(packed, "a.glb/jump")
 
 
 @pytest.mark.parametrize(

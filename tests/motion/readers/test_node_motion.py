@@ -75,7 +75,9 @@ def test_any_scale_gives_finite_transforms(scale: tuple[float, float, float]) ->
     ("tracks", "expected"),
     [
         ([np.arange(100) / 30.0], 30.0),
-        ([np.arange(100) / 29.97], 30.0),
+        ([np.arange(100) / 29.97], 30_000 / 1_001),
+        ([np.arange(100) / 29.9], 30.0),
+        ([np.arange(100) / 23.976], 24_000 / 1_001),
         ([np.arange(100) / 23.9], 60.0),
         ([np.array([0.0, 10.0]), np.arange(50) / 120.0], 120.0),
         ([np.array([0.0])], 60.0),

@@ -6,20 +6,26 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from bunraku.codec import motion_encoder
 from bunraku.codec.container import pack_motion
 from bunraku.codec.extension_encoder import encode_extension
 from bunraku.codec.extension_track import EXTENSION_TYPE
 from bunraku.ingest.jobs.encoding import describe_encoding, encode_motions
-from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.result import NOTHING_MOVES, JobRejection, JobResult
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import Analysis, analyse
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.extension_fit import ExtensionMotion
 from bunraku.motion.readers.bvh import parse_bvh
-from bunraku.motion.readers.motion_file import read_motion
+from bunraku.motion.readers.motion_file import list_takes, read_motion
+from bunraku.motion.readers.takes import TakeList
+from bunraku.motion.skeleton import Motion
 
+STILL_M, STILL_ALIGNMENT = 1e-3, 1.0 - 1e-6
+"""Bounds of a pose: travel of the root in metres, and product of two quaternions, here 0.16 degrees apart."""
 _MINIMAL_BVH = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation } MOTION Frames: 1 Frame Time: 0.1 0"
 
 motion_encoder.warm_up()
@@ -27,18 +33,28 @@ parse_bvh(_MINIMAL_BVH)
 
 
 def encode_file(
-    motion_id: str, path: Path, take: str | None = None, on_progress: Callable[[float], None] = lambda _: None
+    motion_id: str,
+    path: Path,
+    take: str | None = None,
+    must_move: bool = False,
+    on_progress: Callable[[float], None] = lambda _: None,
 ) -> JobResult | JobRejection:
-    """Parse, analyse and encode `take` of the file at `path`; `on_progress` receives the encoded share, 0..1."""
+    """Parse, analyse and encode `take` of the file at `path`; `on_progress` receives the encoded share, 0..1.
+
+    With `must_move`, a motion that is a single pose is rejected.
+    """
     try:
         analysis = analyse(read_motion(path.read_bytes(), take))
         for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
             ArmRig(analysis.motion.figure, limb)
     except UnreadableMotion as error:
-        return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
+        return _reject(error)
     except ProportionsError as error:
         detail = f"the arms of this skeleton cannot be controlled: {error}"
         return JobRejection("No puppet's arms", detail, field=error.field, hint=error.hint)
+    if must_move and _is_still(analysis.motion):
+        hint = "a single pose is stored if its take is uploaded by its name"
+        return JobRejection(NOTHING_MOVES, "it is a single pose", hint=hint)
     on_progress(0.0)
     (encoded,) = encode_motions([analysis.motion], on_progress)
     extension = analysis.extension
@@ -73,3 +89,21 @@ def _describe_extension(analysis: Analysis, extension: ExtensionMotion) -> dict[
             },
         },
     }
+
+
+def list_file_takes(path: Path, limit: int) -> TakeList | JobRejection:
+    """Return the first `limit` takes of the file at `path`; none if it is one motion."""
+    try:
+        return list_takes(path.read_bytes(), limit)
+    except UnreadableMotion as error:
+        return _reject(error)
+
+
+def _reject(error: UnreadableMotion) -> JobRejection:
+    return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
+
+
+def _is_still(motion: Motion) -> bool:
+    """Return whether root and joints are the same in all frames."""
+    alignment = np.abs(np.sum(motion.rotations * motion.rotations[0], axis=-1))
+    return bool(np.ptp(motion.root, axis=0).max() < STILL_M and alignment.min() > STILL_ALIGNMENT)

@@ -16,11 +16,13 @@ from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.readers.bvh_frames import parse_frames
-from bunraku.motion.readers.bvh_hierarchy import parse_hierarchy
+from bunraku.motion.readers.bvh_hierarchy import MAX_LENGTH, Hierarchy, parse_hierarchy
 from bunraku.motion.rotation import Array
-from bunraku.motion.source_motion import EndSite
+from bunraku.motion.source_motion import NTSC_RATES, EndSite
 
 BYTE_ORDER_MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", "utf-16-be"))
+MAX_ANGLE_DEG = 1e6
+"""Largest angle in either direction: beyond thousands of turns there is a broken value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,15 +47,20 @@ class Bvh:
 
     @property
     def fps(self) -> float:
-        """Frames per second: the whole number that `frame_time` was rounded from, if there is one."""
+        """Frames per second: the whole number or NTSC rate that `frame_time` was rounded from, if there is one."""
         rate = 1.0 / self.frame_time
         if abs(rate - round(rate)) < 1e-9 * rate:
             return float(round(rate))
         digits = len(np.format_float_positional(self.frame_time).partition(".")[2])
-        for whole in (round(rate), 24, 25, 30, 50, 60, 90, 100, 120, 240):
-            if whole > 0 and abs(rate - whole) < 0.02 * rate and round(1.0 / whole, digits) == self.frame_time:
-                return float(whole)
+        for usual in (round(rate), 24, 25, 30, 50, 60, 90, 100, 120, 240, *NTSC_RATES):
+            if usual > 0 and abs(rate - usual) < 0.02 * rate and round(1.0 / usual, digits) == self.frame_time:
+                return float(usual)
         return rate
+
+    @property
+    def metres_per_unit(self) -> None:
+        """Unit of length: BVH files declare none."""
+        return None
 
     @property
     def frame_count(self) -> int:
@@ -143,6 +150,7 @@ def parse_bvh(data: bytes) -> Bvh:
             "No channels", "no joint has a channel, so nothing can move", hint="export with rotations of the joints"
         )
     frames, frame_time, notes = parse_frames(text, hierarchy.motion_start, hierarchy.motion_line, width)
+    _check_range(hierarchy, frames)
     return Bvh(
         names=hierarchy.names,
         parents=hierarchy.parents,
@@ -156,8 +164,27 @@ def parse_bvh(data: bytes) -> Bvh:
     )
 
 
+def _check_range(hierarchy: Hierarchy, frames: Array) -> None:
+    """Raise `UnreadableMotion` for values beyond `MAX_ANGLE_DEG` and `MAX_LENGTH`."""
+    owners = [(joint, channel) for joint, channels in enumerate(hierarchy.channels) for channel in channels]
+    limits = [MAX_ANGLE_DEG if channel.endswith("rotation") else MAX_LENGTH for _, channel in owners]
+    too_large = np.abs(frames) > limits
+    if too_large.any():
+        frame, column = np.argwhere(too_large)[0].tolist()
+        joint, channel = owners[column]
+        raise UnreadableMotion(
+            "Value out of range",
+            f"in frame {frame + 1}, {channel} is {frames[frame, column]:.3g}",
+            field=hierarchy.names[joint],
+            hint="the export went wrong in this frame; cut it out or export again",
+        )
+
+
 def _normalise_text(data: bytes) -> bytes:
     """Return `data` without byte order mark, in an ASCII-compatible encoding, with line feeds only."""
+    if len(data) > 1 and 0 in data[:2] and data[0] != data[1]:
+        # the first letter is of two bytes
+        data = (b"\xff\xfe" if data[1] == 0 else b"\xfe\xff") + data
     for mark, encoding in BYTE_ORDER_MARKS:
         if data.startswith(mark):
             data = data[len(mark) :]

@@ -26,7 +26,9 @@ MIN_FRAME_TIME_S, MAX_FRAME_TIME_S = 0.001, 10.0
 # does not match the # of 1.#QNAN, a broken number
 _COMMENT = re.compile(rb"(?<!\S)(?:#|//)[^\n]*")
 _DECIMAL = re.compile(rb"(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?")
-_HEADER_FIELD = re.compile(rb"\s*(frames|frame[ \t]*time)[ \t]*:?[ \t]*([^\s]*)", re.IGNORECASE)
+_HEADER_FIELD = re.compile(
+    rb"\s*(frames|frame[ \t]*time)[ \t]*:?[ \t]*([^\s]*)(?:[ \t]+(?:s|secs?|seconds)\b\.?)?", re.IGNORECASE
+)
 
 
 def parse_frames(text: bytes, start: int, line: int, channel_count: int) -> tuple[Array, float, list[str]]:

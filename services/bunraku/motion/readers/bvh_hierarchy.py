@@ -16,6 +16,9 @@ from bunraku.motion.source_motion import EndSite
 MAX_JOINTS = 1_000
 MAX_DEPTH = 256
 MAX_NAME_BYTES = 200
+MAX_LENGTH = 1e12
+"""Largest offset or position, in any unit: products of larger ones would overflow."""
+CUT_SHORT_HINT = "the file may be cut short; export it again"
 AXES = "xyz"
 ORIGIN = (0.0, 0.0, 0.0)
 CHANNEL_NAMES = {
@@ -244,13 +247,13 @@ def _parse_end_site(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
 
 def _expect_open_brace(tokens: _Tokenizer, name: bytes) -> None:
     line = tokens.line
-    if tokens.next_token() != b"{":
+    if (word := tokens.next_token()) != b"{":
         raise UnreadableMotion(
             "Missing brace",
             f"no {{ after {quote_excerpt(name)}",
             line=line,
             field=_decode_names([name])[0],
-            hint="add the {",
+            hint="add the {" if word else CUT_SHORT_HINT,
         )
 
 
@@ -291,13 +294,13 @@ def _parse_number(tokens: _Tokenizer, line: int) -> float:
         value = float(plain) if len(plain) <= MAX_NAME_BYTES and b"_" not in plain else math.nan
     except ValueError:
         value = math.nan
-    if not math.isfinite(value):
+    if not abs(value) <= MAX_LENGTH:
         raise UnreadableMotion(
             "Not a number",
-            f"OFFSET needs three finite numbers, not {quote_excerpt(word)}",
+            f"OFFSET needs three numbers within {MAX_LENGTH:.0e}, not {quote_excerpt(word)}",
             line=line,
             field="OFFSET",
-            hint="write the three lengths as plain decimal numbers",
+            hint="write the three lengths as plain decimal numbers" if word else CUT_SHORT_HINT,
         )
     return value
 
@@ -321,7 +324,7 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
             f"CHANNELS needs a count, not {quote_excerpt(word)}",
             line=line,
             field="CHANNELS",
-            hint="write how many channels follow",
+            hint="write how many channels follow" if word else CUT_SHORT_HINT,
         )
     count = int(word)
     found: list[str] = []

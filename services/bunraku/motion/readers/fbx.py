@@ -14,10 +14,12 @@ import ufbx
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 from bunraku.motion.readers.node_motion import Node, NodeMotion, Track, choose_rate, sample_nodes
-from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.readers.takes import choose_take, describe_choice, name_takes
 from bunraku.motion.rotation import Array
 
 MAX_NODES = 1_000
+MAX_VALUE = 1e12
+"""Largest translation and scale, in any unit: products of larger ones would overflow."""
 SPAN_TOLERANCE_S = 1e-3
 """Keys this near to a take's span belong to it."""
 _LOAD_OPTIONS: dict[str, Any] = {
@@ -25,7 +27,14 @@ _LOAD_OPTIONS: dict[str, Any] = {
     "ignore_geometry": True,
     "ignore_embedded": True,
     "node_depth_limit": 256,
+    # bones that do not inherit the scale above them get its inverse
+    "inherit_mode_handling": ufbx.InheritModeHandling.COMPENSATE,
 }
+_CONVERSION_OPTIONS: dict[str, Any] = {
+    "target_axes": ufbx.axes_right_handed_y_up,
+    "handedness_conversion_axis": ufbx.MirrorAxis.X,
+}
+"""Options for files in left-handed axes, in which the body would be its mirror image."""
 _Keep = Callable[[Any], Any]
 _BONELESS = {ufbx.ElementType.MESH, ufbx.ElementType.CAMERA, ufbx.ElementType.LIGHT}
 
@@ -37,28 +46,53 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
     process: parse in a separate process.
     """
     with _uncollected() as keep:
-        try:
-            scene = keep(ufbx.load_memory(data, **_LOAD_OPTIONS))
-        except (ufbx.UfbxError, ValueError) as error:
-            detail = str(error) or type(error).__name__
-            raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
+        scene = _load_scene(data, keep)
+        if _is_left_handed(keep(keep(scene.settings).axes)):
+            scene = _load_scene(data, keep, **_CONVERSION_OPTIONS)
         stacks = [keep(stack) for stack in keep(scene.anim_stacks)]
         if not stacks:
             raise UnreadableMotion(
                 "No animation", "the file has a model, but no animation", hint="export it with its animation"
             )
         curves = [_moving_curves(stack, keep) for stack in stacks]
-        names = [stack.name or f"take {number}" for number, stack in enumerate(stacks, 1)]
+        names = _take_names(stacks)
         chosen = choose_take(names, [len(moving) for moving in curves], take)
         times = [np.array([key.time for key in keep(curve.keyframes)]) for curve in curves[chosen]]
         if not times:
             detail = f"the take {quote_excerpt(names[chosen])} moves nothing"
-            raise UnreadableMotion("Nothing moves", detail, field=names[chosen])
+            hint = "export it with the animation of its joints"
+            raise UnreadableMotion("Nothing moves", detail, field=names[chosen], hint=hint)
         start, end = _find_span(stacks[chosen], times)
         nodes, elements = _read_nodes(scene, keep)
-        motion = sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
+        if len(nodes) < 2:
+            detail = "none of its objects is a joint"
+            raise UnreadableMotion("No skeleton", detail, hint="export it with its skeleton (armature, bones)")
+        notes = [*describe_choice(names, chosen), *_describe_muted_layers(stacks[chosen], keep)]
+        unit = _read_unit(keep(scene.settings), keep)
+        motion = sample_nodes(nodes, start, end, choose_rate(times), notes, unit)
         _sample_tracks(keep(stacks[chosen].anim), motion, elements)
         return motion
+
+
+def list_fbx_takes(data: bytes) -> list[str]:
+    """Return the names of a file's takes. Raises `UnreadableMotion` if the data is not an FBX file.
+
+    A file that crashes ufbx ends the process.
+    """
+    with _uncollected() as keep:
+        return _take_names([keep(stack) for stack in keep(_load_scene(data, keep).anim_stacks)])
+
+
+def _load_scene(data: bytes, keep: _Keep, **options: Any) -> ufbx.Scene:
+    try:
+        return keep(ufbx.load_memory(data, **_LOAD_OPTIONS, **options))
+    except (ufbx.UfbxError, ValueError) as error:
+        detail = str(error) or type(error).__name__
+        raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
+
+
+def _take_names(stacks: Sequence[ufbx.AnimStack]) -> list[str]:
+    return name_takes(stack.name or f"take {number}" for number, stack in enumerate(stacks, 1))
 
 
 @contextmanager
@@ -81,6 +115,36 @@ def _uncollected() -> Iterator[_Keep]:
         gc.freeze()
         if was_enabled:
             gc.enable()
+
+
+def _is_left_handed(axes: ufbx.CoordinateAxes) -> bool:
+    """Return whether axes, of which each is one of 0..5 for x, -x, y, -y, z and -z or unknown, are left-handed."""
+    numbers = [int(axes.right), int(axes.up), int(axes.front)]
+    if {number // 2 for number in numbers} != {0, 1, 2}:
+        return False
+    matrix = np.zeros((3, 3))
+    for row, number in enumerate(numbers):
+        matrix[row, number // 2] = -1.0 if number % 2 else 1.0
+    return bool(np.linalg.det(matrix) < 0.0)
+
+
+def _describe_muted_layers(stack: ufbx.AnimStack, keep: _Keep) -> list[str]:
+    """Return a sentence about each muted layer that has curves: ufbx evaluates them, too."""
+    return [
+        f"The layer {quote_excerpt(layer.name)} is muted in the file, but was read."
+        for layer in [keep(layer) for layer in keep(stack.layers)]
+        if len(keep(layer.anim_props)) > 0
+        and any(
+            prop.name == "Mute" and prop.value_int for prop in [keep(each) for each in keep(keep(layer.props).props)]
+        )
+    ]
+
+
+def _read_unit(settings: ufbx.SceneSettings, keep: _Keep) -> float | None:
+    """Return the metres per unit that the file declares, None if it does not."""
+    declared = {keep(prop).name for prop in keep(keep(settings.props).props)}
+    unit = settings.unit_meters
+    return unit if "UnitScaleFactor" in declared and np.isfinite(unit) and unit > 0.0 else None
 
 
 def _moving_curves(stack: ufbx.AnimStack, keep: _Keep) -> list[ufbx.AnimCurve]:
@@ -132,8 +196,13 @@ def _sample_tracks(animation: ufbx.Anim, motion: NodeMotion, elements: Sequence[
                 for each in (ufbx.evaluate_transform(animation, element, time) for time in times.tolist())
             ]
         )
-        if not np.isfinite(sampled).all():
-            raise UnreadableMotion("Broken FBX file", "its animation has values that are no numbers", field=node.name)
+        if not (np.abs(sampled) <= MAX_VALUE).all():
+            raise UnreadableMotion(
+                "Broken FBX file",
+                f"its animation has values that are no numbers, or beyond {MAX_VALUE:.0e}",
+                field=node.name,
+                hint="the export went wrong; export it again, or cut the part that is performed",
+            )
         node.tracks["translation"] = Track(times, sampled[:, :3])
         node.tracks["rotation"] = Track(times, rotation.normalise(sampled[:, [6, 3, 4, 5]]))
         node.tracks["scale"] = Track(times, sampled[:, 7:])

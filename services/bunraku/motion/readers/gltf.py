@@ -21,11 +21,13 @@ from bunraku.motion.readers.node_motion import (
     choose_rate,
     sample_nodes,
 )
-from bunraku.motion.readers.takes import choose_take, describe_choice
+from bunraku.motion.readers.takes import choose_take, describe_choice, name_takes
 from bunraku.motion.rotation import Array
 
 MAX_NODES = 1_000
 """Joints that are read, those that carry nothing but meshes left out."""
+METRES_PER_UNIT = 1.0
+"""Unit of length (glTF 2.0, 3.4)."""
 COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
 _HUMANOIDS = (("VRMC_vrm_animation", "humanoid"), ("VRMC_vrm", "humanoid"), ("VRM", "humanoid"))
 
@@ -41,7 +43,7 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
         raise UnreadableMotion(
             "No animation", "the file has a model, but no animation", hint="export it with its animation"
         )
-    names = [str(animation.get("name") or f"animation {number}") for number, animation in enumerate(animations, 1)]
+    names = _take_names(animations)
     channels = [_find_channels(file, animation, f"animations[{number}]") for number, animation in enumerate(animations)]
     chosen = choose_take(names, [len({node for node, _ in moved}) for moved in channels], take)
     tracks = _read_tracks(file, animations[chosen], channels[chosen], f"animations[{chosen}]")
@@ -51,10 +53,22 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
     times = [track.times for track in tracks.values()]
     if not times:
         raise UnreadableMotion(
-            "Nothing moves", f"the animation {quote_excerpt(names[chosen])} moves no node", field=names[chosen]
+            "Nothing moves",
+            f"the animation {quote_excerpt(names[chosen])} moves no node",
+            field=names[chosen],
+            hint="export the motion of the skeleton; blend shapes alone move no joint",
         )
     start, end = min(float(each[0]) for each in times), max(float(each[-1]) for each in times)
-    return sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen))
+    return sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen), METRES_PER_UNIT)
+
+
+def list_gltf_takes(data: bytes) -> list[str]:
+    """Return the names of an asset's animations. Raises `UnreadableMotion` if the data is no glTF asset."""
+    return _take_names(parse_gltf_file(data).items("animations"))
+
+
+def _take_names(animations: list[dict[str, Any]]) -> list[str]:
+    return name_takes(str(item.get("name") or f"animation {number}") for number, item in enumerate(animations, 1))
 
 
 _Channels = dict[tuple[int, str], object]
@@ -105,6 +119,8 @@ def _read_track(file: GltfFile, sampler: dict[str, Any], times: Array, path: str
         raise broken(where, f"a {path} has {len(times)} keys and {len(values)} values")
     if not np.isfinite(values).all():
         raise broken(where, f"a {path} has values that are no numbers")
+    if path == "rotation" and not (np.abs(values[1::3] if per_key == 3 else values).max(axis=1) > 0.0).all():
+        raise broken(where, "a rotation has a quaternion that is zero")
     if path == "rotation":
         values = values[:, [3, 0, 1, 2]]
         if interpolation is not Interpolation.CUBIC:

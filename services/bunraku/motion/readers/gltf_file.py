@@ -24,6 +24,7 @@ _HEADER = struct.Struct("<4sII")
 _CHUNK = struct.Struct("<I4s")
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_INDEX_DTYPES = {code: _DTYPES[code] for code in (5121, 5123, 5125)}
 _REEXPORT = "export the file again, as GLB"
 _DATA_URI = "data:"
 
@@ -66,18 +67,44 @@ class GltfFile:
             raise UnreadableMotion(
                 "Too much motion", f"over {MAX_VALUES:,} numbers", field=where, hint="cut it into shorter animations"
             )
-        if "sparse" in accessor or "bufferView" not in accessor:
-            raise broken(where, "sparse accessors are not read")
-        values = self._read_view(accessor, np.dtype(dtype), count, components)
+        if "bufferView" in accessor:
+            values = self._read_view(accessor, np.dtype(dtype), count, components, where)
+        else:
+            values = np.zeros((count, components), dtype)
+        if "sparse" in accessor:
+            values = self._replace_sparse(accessor["sparse"], values, f"{where}.sparse")
         if accessor.get("normalized") is True and values.dtype.kind != "f":
             scaled = values / float(np.iinfo(values.dtype).max)
             return np.maximum(scaled, -1.0)
         return values.astype(np.float64)
 
+    def _replace_sparse(self, sparse: object, values: np.ndarray[Any, Any], where: str) -> np.ndarray[Any, Any]:
+        """Return `values` with those of a sparse accessor in their places (glTF 2.0, 3.6.2.3)."""
+        if not isinstance(sparse, dict):
+            raise broken(where, "it is no object")
+        count = sparse.get("count")
+        if isinstance(count, bool) or not isinstance(count, int) or not 0 < count <= len(values):
+            raise broken(where, f"count is {quote_excerpt(str(count))}, of {len(values)} elements")
+        parts: list[dict[str, Any]] = []
+        for name in ("indices", "values"):
+            part = sparse.get(name)
+            if not isinstance(part, dict) or "bufferView" not in part:
+                raise broken(f"{where}.{name}", "it has no bufferView")
+            parts.append(part)
+        index_type = _INDEX_DTYPES.get(parts[0].get("componentType", 0))
+        if index_type is None:
+            raise broken(f"{where}.indices", "its componentType is none of indices")
+        indices = self._read_view(parts[0], np.dtype(index_type), count, 1, f"{where}.indices")[:, 0].astype(np.int64)
+        if (np.diff(indices) <= 0).any() or indices[-1] >= len(values):
+            raise broken(f"{where}.indices", f"they do not ascend below {len(values)}")
+        replaced = values.copy()
+        replaced[indices] = self._read_view(parts[1], values.dtype, count, values.shape[1], f"{where}.values")
+        return replaced
+
     def _read_view(
-        self, accessor: dict[str, Any], dtype: np.dtype[Any], count: int, components: int
+        self, accessor: dict[str, Any], dtype: np.dtype[Any], count: int, components: int, place: str
     ) -> np.ndarray[Any, Any]:
-        """Return the values (n, `components`) of an accessor as they are stored."""
+        """Return the values (n, `components`) of an accessor, or a part of one, at `place` as they are stored."""
         view = self.item("bufferViews", accessor["bufferView"])
         where = f"bufferViews[{accessor['bufferView']}]"
         if "EXT_meshopt_compression" in view.get("extensions", {}):
@@ -94,7 +121,7 @@ class GltfFile:
             _whole(view, "byteLength", 0, where),
             _whole(view, "byteStride", width, where),
         )
-        offset = _whole(accessor, "byteOffset", 0, where)
+        offset = _whole(accessor, "byteOffset", 0, place)
         if stride < width or start + length > len(buffer) or offset + (count - 1) * stride + width > length:
             raise broken(where, f"{count} elements of {width} bytes reach beyond its data")
         raw = np.frombuffer(buffer, np.uint8, (count - 1) * stride + width, start + offset)

@@ -13,7 +13,7 @@ from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rotation import Array
-from bunraku.motion.source_motion import EndSite
+from bunraku.motion.source_motion import NTSC_RATES, EndSite
 
 MAX_FRAMES, MAX_JOINT_FRAMES = 1_000_000, 8_000_000
 """Bounds of the frames that sparse keys are sampled at, and of frames times joints."""
@@ -23,6 +23,12 @@ MIN_SCALE = 1e-9
 """Smaller scales count as this one, so that descendants keep their orientation."""
 EVEN_TOLERANCE = 0.02
 """Frame rates this near to a whole number, as a share, are that number."""
+
+
+STEP_TOLERANCE_S = 1e-4
+"""Steps this little after a frame belong to it: times of keys are rounded."""
+NTSC_TOLERANCE = 2.5e-4
+"""Frame rates this near to one of NTSC, as a share, are that one: a quarter of its distance from a whole number."""
 
 
 class Interpolation(StrEnum):
@@ -47,7 +53,7 @@ class Track:
     def sample(self, times: Array) -> Array:
         """Return the values (n, m) at `times` (n,); before the first and after the last key, those of that key."""
         if len(self.times) == 1 or self.interpolation is Interpolation.STEP:
-            after = np.searchsorted(self.times, times, side="right") - 1
+            after = np.searchsorted(self.times, times + STEP_TOLERANCE_S, side="right") - 1
             held: Array = self._knots()[np.clip(after, 0, len(self.times) - 1)]
             return held
         index = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self.times) - 2)
@@ -110,6 +116,7 @@ class NodeMotion:
     fps: float
     frame_count: int
     notes: tuple[str, ...] = ()
+    metres_per_unit: float | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -185,10 +192,13 @@ def _orientation(axes: Array) -> Array:
 
 
 def choose_rate(key_times: Sequence[Array]) -> float:
-    """Return the frame rate of tracks with `key_times`: that of the densest track, whole if it is nearly so."""
+    """Return the frame rate of the densest track with `key_times`; a whole number or an NTSC rate if it nearly is."""
     steps = [float(np.median(np.diff(times))) for times in key_times if len(times) > 2]
     steps = [step for step in steps if step > 0.0]
     rate = 1.0 / min(steps) if steps else DEFAULT_FPS
+    for usual in NTSC_RATES:
+        if abs(rate - usual) < NTSC_TOLERANCE * usual:
+            return usual
     if rate < MIN_FPS:
         return DEFAULT_FPS
     if abs(rate - round(rate)) < EVEN_TOLERANCE * rate and round(rate) > 0:
@@ -196,7 +206,14 @@ def choose_rate(key_times: Sequence[Array]) -> float:
     return min(rate, MAX_FPS)
 
 
-def sample_nodes(nodes: Sequence[Node], start: float, end: float, fps: float, notes: Sequence[str]) -> NodeMotion:
+def sample_nodes(
+    nodes: Sequence[Node],
+    start: float,
+    end: float,
+    fps: float,
+    notes: Sequence[str],
+    metres_per_unit: float | None = None,
+) -> NodeMotion:
     """Return the motion of `nodes` from `start` to `end`, in seconds; raise `UnreadableMotion` if it is too much."""
     duration = end - start
     if not np.isfinite(duration) or duration * fps > MAX_FRAMES:
@@ -210,4 +227,4 @@ def sample_nodes(nodes: Sequence[Node], start: float, end: float, fps: float, no
             f"{frame_count:,} frames of {len(nodes)} joints are more than {MAX_JOINT_FRAMES:,}",
             hint="cut the animation into shorter ones, or export the body's joints only",
         )
-    return NodeMotion(tuple(nodes), start, fps, frame_count, tuple(notes))
+    return NodeMotion(tuple(nodes), start, fps, frame_count, tuple(notes), metres_per_unit)

@@ -1,13 +1,39 @@
-"""Choice of one motion of a file that has several."""
+"""Names of the motions of a file that has several, and the choice of one of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
 
+MAX_NAME_CHARACTERS = 200
+"""Characters of a name beyond which it is cut."""
 MAX_LISTED = 20
 """Names that a message lists."""
+_UNSTORABLE = re.compile("[\x00-\x1f\x7f\ud800-\udfff]")
+
+
+@dataclass(frozen=True, slots=True)
+class TakeList:
+    """First names of the motions of a file, each of which `read_motion` accepts as a take, and the number of all."""
+
+    names: list[str]
+    count: int
+
+
+def name_takes(names: Iterable[str]) -> list[str]:
+    """Return names that are unique, short and without control characters: a second "walk" becomes "walk (2)"."""
+    found: dict[str, None] = {}
+    used: dict[str, int] = {}
+    for name in names:
+        base = unique = _UNSTORABLE.sub("\ufffd", name[:MAX_NAME_CHARACTERS])
+        while unique in found:
+            used[base] = used.get(base, 1) + 1
+            unique = f"{base} ({used[base]})"
+        found[unique] = None
+    return list(found)
 
 
 def choose_take(names: Sequence[str], sizes: Sequence[int], take: str | None) -> int:

@@ -4,7 +4,7 @@ import { translate } from "../i18n/translator";
 import type { LibraryPanel } from "../ui/library/library-panel";
 import type { MotionItem } from "../ui/library/motion-item";
 import type { MotionList } from "../ui/library/motion-list";
-import { showProblem } from "../ui/library/upload";
+import { showProblem } from "../ui/library/problem-report";
 import { MAX_PERFORMERS } from "../wire/limbs";
 import type { RemotePlayback } from "./remote-playback";
 

@@ -4,7 +4,7 @@ import type { ExportFormat } from "../export/export-file";
 import { translate } from "../i18n/translator";
 import { saveFile } from "../ui/library/file-download";
 import type { MotionItem } from "../ui/library/motion-item";
-import { showProblem } from "../ui/library/upload";
+import { showProblem } from "../ui/library/problem-report";
 import type { Page } from "../ui/page";
 
 export class Exporter {

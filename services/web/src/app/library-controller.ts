@@ -7,6 +7,9 @@ import type { RemotePlayback } from "./remote-playback";
 /** Interval at which the library is looked at for a motion that is being stored, and the number of times. */
 const [STORED_INTERVAL_MS, STORED_ATTEMPTS] = [1000, 30];
 
+/** Interval at which the library is looked at for takes that the server stores later, and the number of times. */
+const [PENDING_INTERVAL_MS, PENDING_ATTEMPTS] = [5000, 60];
+
 export class LibraryController {
   readonly motions = new MotionList();
 
@@ -40,6 +43,14 @@ export class LibraryController {
       await new Promise((resolve) => setTimeout(resolve, STORED_INTERVAL_MS));
     }
     return null;
+  }
+
+  /** Show motions that the server stores within the next minutes. */
+  async refreshRepeatedly(): Promise<void> {
+    for (let attempt = 0; attempt < PENDING_ATTEMPTS; attempt++) {
+      await new Promise((resolve) => setTimeout(resolve, PENDING_INTERVAL_MS));
+      await this.refresh().catch(() => undefined);
+    }
   }
 
   /** Delete a motion from the library. Rejects with ProblemError. */

@@ -4,7 +4,7 @@ import { createSession, findOrCreateSession, getSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import type { EngineCommand, PlaybackChange, PlaybackRequest, ViewerTime } from "../engine/message";
 import { translate } from "../i18n/translator";
-import { showProblem } from "../ui/library/upload";
+import { showProblem } from "../ui/library/problem-report";
 import type { Page } from "../ui/page";
 import { PHONE } from "../ui/window-shape";
 import type { AvatarSlots } from "./avatar-slot";
@@ -101,8 +101,11 @@ export class PlaybackController {
     }
   }
 
-  /** Put a motion on the stage: in the session, for all its viewers, or in a new session if there is none. */
-  async playMotion(id: string): Promise<void> {
+  /**
+   * Put a motion on the stage: in the session, for all its viewers, or in a new session if there is none. On a phone the
+   * library is closed, unless `keepsLibrary`.
+   */
+  async playMotion(id: string, keepsLibrary = false): Promise<void> {
     const { library, page, reducedMotion } = this.options;
     if (!pageAccess.allows("control")) return;
     try {
@@ -113,16 +116,16 @@ export class PlaybackController {
         const playback = this.#open(session.id);
         if (reducedMotion.matches) playback.edit({ playing: false });
       }
-      if (PHONE.matches) page.panels.close("library");
+      if (PHONE.matches && !keepsLibrary) page.panels.close("library");
     } catch (error) {
       showProblem(page.library, library.motions.find(id)?.name ?? translate("This dance"), error);
     }
   }
 
   /** Put an uploaded motion on the stage, even if the list cannot be fetched now. */
-  async playUploadedMotion(id: string): Promise<void> {
+  async playUploadedMotion(id: string, keepsLibrary = false): Promise<void> {
     await this.options.library.refresh().catch(() => undefined);
-    await this.playMotion(id);
+    await this.playMotion(id, keepsLibrary);
   }
 
   /** Enter a session, and leave the current one. */

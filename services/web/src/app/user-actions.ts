@@ -2,12 +2,13 @@
 
 import { pageAccess } from "../client/access";
 import { recordSession } from "../client/api";
+import { ProblemError } from "../client/problem";
 import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
 import type { CaptureTarget } from "../ui/library/performer-guide";
-import { showProblem, uploadAll } from "../ui/library/upload";
+import { showProblem } from "../ui/library/problem-report";
 import type { Page, UserActions } from "../ui/page";
 import type { ThemeChoice } from "../ui/theme";
 import { createRecordAction, type KeptMotionActions, showKept } from "../ui/transport/recording";
@@ -23,6 +24,7 @@ import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
 import type { SoundController } from "./sound-controller";
 import type { StageHost } from "./stage-host";
+import type { UploadTarget } from "./upload-controller";
 import type { WebcamStage } from "./webcam-controller";
 
 /** Parts of the application that actions use. An action reads them when it runs: the page is built before them. */
@@ -123,13 +125,30 @@ export function createKeyActions(app: AppParts): PageActions {
 }
 
 /** Load the last avatar file of these, and upload all motion files if this page may. */
-async function openFiles({ page, avatarSlots, playback }: AppParts, files: readonly File[]): Promise<void> {
+async function openFiles(app: AppParts, files: readonly File[]): Promise<void> {
+  const { page, avatarSlots } = app;
   const kinds = await Promise.all(files.map(findFileKind));
   const avatar = files.findLast((_, index) => kinds[index] === "avatar");
   if (avatar) void avatarSlots.selected.load(avatar);
   const motions = pageAccess.allows("ingest") ? files.filter((_, index) => kinds[index] === "motion") : [];
   if (avatar || motions.length > 0) page.panels.open("library");
-  await uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
+  if (motions.length === 0) return;
+  try {
+    const { uploadFiles } = await import("./upload-controller");
+    uploadFiles(uploadTarget(app), motions);
+  } catch {
+    showProblem(page.library, motions[0].name, ProblemError.unreachable());
+  }
+}
+
+function uploadTarget({ page, library, playback }: AppParts): UploadTarget {
+  return {
+    library: page.library,
+    toast: page.toast,
+    refresh: () => library.refresh().catch(() => undefined),
+    refreshLater: () => library.refreshRepeatedly(),
+    play: (id, keepsLibrary) => playback.playUploadedMotion(id, keepsLibrary),
+  };
 }
 
 function webcamStage(app: AppParts): WebcamStage {

@@ -1,5 +1,6 @@
 /** HTTP API for motions and sessions (`proto/http.md`). */
 
+import { pageTranslator } from "../i18n/translator";
 import { type Access, pageAccess } from "./access";
 import { ProblemError } from "./problem";
 
@@ -186,26 +187,47 @@ export async function shareSession(session: string): Promise<ShareLink> {
   return (await requestJson("POST", "/v1/shares", { session })) as ShareLink;
 }
 
-/** Current stage of an upload, on the way or on the server, and the share of the stage that is done, 0..1. */
+/**
+ * Current stage of an upload, on the way or on the server, and the share of the stage that is done, 0..1. If the file
+ * has several takes, `take` is the number of the current one, from 1, of `takes`.
+ */
 export interface UploadProgress {
   stage: "sending" | "preparing" | "waiting" | "reading" | "encoding";
   share: number;
+  take?: number;
+  takes?: number;
+}
+
+/** Take of a file that was not stored, and the reason; `take` is null for those beyond the maximum of a file. */
+export interface SkippedTake {
+  take: string | null;
+  title: string;
+  detail: string;
+  line: number | null;
+  hint: string | null;
+}
+
+/** Motions of a file, takes that were not stored, and the names of takes that the server stores later. */
+export interface StoredTakes {
+  items: Motion[];
+  skipped: SkippedTake[];
+  pending: string[];
 }
 
 /** Interval between requests for the progress of an upload on the server. */
 export const PROGRESS_INTERVAL_MS = 400;
 
 /**
- * Upload a motion capture file. An XMLHttpRequest is used, since fetch does not report the progress of sending; the
+ * Upload a motion capture file, and store each of its takes. An XMLHttpRequest is used, since fetch does not report the progress of sending; the
  * progress on the server is polled.
  *
  * @throws ProblemError if the upload fails, or the reason of `signal` if it is aborted
  */
-export function uploadMotion(
+export function uploadTakes(
   file: File,
   onProgress?: (progress: UploadProgress) => void,
   signal?: AbortSignal,
-): Promise<Motion> {
+): Promise<StoredTakes> {
   return new Promise((resolve, reject) => {
     signal?.throwIfAborted();
     const uploadId = createUploadId();
@@ -228,13 +250,28 @@ export function uploadMotion(
     request.addEventListener("load", () => {
       if (request.status >= 300)
         reject(pageAccess.reportProblem(ProblemError.from(request.status, request.responseText)));
-      else resolve(JSON.parse(request.responseText) as Motion);
+      else resolve(translateReasons(JSON.parse(request.responseText) as StoredTakes));
     });
-    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${uploadId}`);
+    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${uploadId}&takes=all`);
     request.setRequestHeader("Content-Type", "application/octet-stream");
     for (const [name, value] of Object.entries(pageAccess.authorization())) request.setRequestHeader(name, value);
     request.send(file);
   });
+}
+
+/** Translate the server's reasons for takes that were not stored. */
+function translateReasons({ skipped, ...stored }: StoredTakes): StoredTakes {
+  const { translateServerText } = pageTranslator;
+  return {
+    ...stored,
+    skipped: skipped.map(({ take, title, detail, line, hint }) => ({
+      take,
+      title: translateServerText(title),
+      detail: translateServerText(detail),
+      line,
+      hint: hint && translateServerText(hint),
+    })),
+  };
 }
 
 /** Report the progress of an upload on the server until `ended`. Errors are ignored: the upload reports its own. */

@@ -152,16 +152,18 @@ describe("uploads", () => {
   test("send the file, report progress, and return the motion", async () => {
     vi.stubGlobal("XMLHttpRequest", Request);
     const reported: api.UploadProgress[] = [];
-    const motion = api.uploadMotion(file, (progress) => reported.push(progress));
+    const motion = api.uploadTakes(file, (progress) => reported.push(progress));
     expect(Request.last.arguments).toEqual([
       "POST",
-      expect.stringMatching(/^\/v1\/motions\?filename=my%20dance.bvh&upload=[0-9a-f]{32}$/),
+      expect.stringMatching(/^\/v1\/motions\?filename=my%20dance.bvh&upload=[0-9a-f]{32}&takes=all$/),
       file,
     ]);
     expect(Request.last.headers).toEqual({ "Content-Type": "application/octet-stream" });
     Request.last.upload.dispatchEvent(Object.assign(new Event("progress"), { loaded: 3, total: 9 }));
-    Request.last.respond(201, '{"id": "abc"}');
-    expect((await motion).id).toBe("abc");
+    const reason = { take: "T-pose", title: "Nothing moves", detail: "it is a single pose", line: null, hint: null };
+    const stored = { items: [{ id: "abc" }], skipped: [reason], pending: ["run"] };
+    Request.last.respond(201, JSON.stringify(stored));
+    expect(await motion).toEqual(stored);
     expect(reported).toEqual([{ stage: "sending", share: 1 / 3 }]);
   });
 
@@ -182,12 +184,12 @@ describe("uploads", () => {
       return Promise.resolve(new Response(JSON.stringify(response), { status: response ? 200 : 404 }));
     });
     const reported: api.UploadProgress[] = [];
-    const motion = api.uploadMotion(file, (progress) => reported.push(progress));
+    const motion = api.uploadTakes(file, (progress) => reported.push(progress));
     await vi.advanceTimersByTimeAsync(5 * api.PROGRESS_INTERVAL_MS);
     expect(paths).toEqual([]);
     Request.last.upload.dispatchEvent(new Event("load"));
     await vi.advanceTimersByTimeAsync(4.5 * api.PROGRESS_INTERVAL_MS);
-    Request.last.respond(201, '{"id": "abc"}');
+    Request.last.respond(201, '{"items": [], "skipped": [], "pending": []}');
     await motion;
     await vi.advanceTimersByTimeAsync(5 * api.PROGRESS_INTERVAL_MS);
     expect(reported).toEqual([
@@ -201,7 +203,7 @@ describe("uploads", () => {
 
   test("fail with the server's problem", async () => {
     vi.stubGlobal("XMLHttpRequest", Request);
-    const motion = api.uploadMotion(file);
+    const motion = api.uploadTakes(file);
     Request.last.respond(422, '{"title": "Not a motion", "detail": "NaN", "line": 7}');
     await expect(motion).rejects.toMatchObject({ title: "Not a motion", line: 7 });
   });
@@ -209,9 +211,9 @@ describe("uploads", () => {
   test("reject when aborted", async () => {
     vi.stubGlobal("XMLHttpRequest", Request);
     const cancel = new AbortController();
-    const motion = api.uploadMotion(file, undefined, cancel.signal);
+    const motion = api.uploadTakes(file, undefined, cancel.signal);
     cancel.abort();
     await expect(motion).rejects.toMatchObject({ name: "AbortError" });
-    await expect(api.uploadMotion(file, undefined, cancel.signal)).rejects.toMatchObject({ name: "AbortError" });
+    await expect(api.uploadTakes(file, undefined, cancel.signal)).rejects.toMatchObject({ name: "AbortError" });
   });
 });

@@ -2,25 +2,19 @@
  * Library panel: drop zone, progress of uploads and downloads, errors, list of motions, avatar section, and the guide
  * for live performers.
  */
-import type { UploadProgress } from "../../client/api";
-import { formatPercent } from "../../i18n/number-format";
-import { joinList, translate, translateToParts } from "../../i18n/translator";
-import { element, setAttribute, setText } from "../dom";
-import { formatDuration, formatIngestStage, formatUploadProgress } from "../format";
+import { translate, translateToParts } from "../../i18n/translator";
+import { element, setAttribute } from "../dom";
+import { formatDuration } from "../format";
 import { type IconName, icon, motionGlyph } from "../icon";
 import { createPanel, type Panel } from "../panel";
 import { type AvatarActions, type AvatarChooser, createAvatarChooser } from "./avatar-chooser";
 import { createDownloadMenu, type DownloadMenu, type RequestDownload } from "./download-menu";
 import type { MotionItem } from "./motion-item";
 import type { CaptureTarget } from "./performer-guide";
+import { createProgressRow, removeItem } from "./progress-row";
 
-export interface UploadRow {
-  /** Show the bytes sent, of `total`, after `seconds` seconds. */
-  showSent(loaded: number, total: number, seconds: number): void;
-  /** Show the stage of the server's work, and its fraction done. */
-  showIngest(stage: UploadProgress["stage"], fraction: number): void;
-  remove(): void;
-}
+/** Problems that are shown at the same time. Older ones are removed. */
+const MAX_PROBLEMS = 20;
 
 export interface DownloadRow {
   /** Show the current step, and the fraction of the whole. */
@@ -34,12 +28,15 @@ export interface LibraryPanel {
   /** Load the guide for live performers, unless it was loaded before. Call this when the panel opens. */
   load(): void;
   renderMotions(motions: readonly MotionItem[], current: string | null): void;
-  addUpload(name: string, cancel: () => void): UploadRow;
+  /** Place of the uploads, and the button before it. */
+  readonly uploads: HTMLElement;
+  readonly drop: HTMLElement;
   addDownload(name: string, cancel: () => void): DownloadRow;
   /** Open the download menu of a motion. */
   showDownloads(id: string): void;
-  /** Show an error about the file or motion `name`, in place of the last one. */
+  /** Show an error about the file or motion `name`, in place of an earlier one about it. */
   problem(name: string, title: string, detail: string, hint: string | null): void;
+  clearProblems(): void;
 }
 
 export interface LibraryActions extends AvatarActions {
@@ -72,8 +69,10 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
   drop.append(
     element("span", {}, translate("motion .bvh, .fbx, .glb, .vrma or .zip, up to 64 MB, or press to choose")),
   );
-  const transfers = element("div", { role: "group", "aria-label": translate("Uploads and downloads") });
-  const alert = element("div", { role: "alert" });
+  const uploads = element("div");
+  const transfers = element("div", { role: "group", "aria-label": translate("Uploads and downloads") }, uploads);
+  const alert = element("div", { class: "problems", role: "alert" });
+  const problems = new Map<string, HTMLElement>();
   const list = element("ul", { class: "motions" });
   const empty = element(
     "p",
@@ -90,6 +89,8 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
   return {
     panel,
     danceAs,
+    uploads,
+    drop,
     load() {
       if (isGuideRequested) return;
       isGuideRequested = true;
@@ -115,18 +116,9 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
         }),
       );
     },
-    addUpload(name, cancel) {
-      const { show, remove } = createProgressRow(transfers, "upload", name, cancel);
-      return {
-        showSent: (loaded, total, seconds) =>
-          show(total > 0 ? loaded / total : 0, formatUploadProgress(loaded, total, seconds)),
-        showIngest: (stage, fraction) => show(fraction, formatIngestStage(stage)),
-        remove,
-      };
-    },
     addDownload(name, cancel) {
       const { show, remove } = createProgressRow(transfers, "download", name, cancel);
-      return { showProgress: (text, fraction) => show(fraction, text), remove };
+      return { showProgress: (text, fraction) => show(fraction, text), remove: () => remove(drop) };
     },
     showDownloads: (id) => menus.get(id)?.open(),
     problem(name, title, detail, hint) {
@@ -137,10 +129,24 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
         element("p", {}, detail),
       );
       if (hint) box.append(element("p", { class: "muted" }, hint));
-      box.append(
-        element("button", { class: "text-button", type: "button", onClick: () => box.remove() }, translate("Dismiss")),
-      );
-      alert.replaceChildren(box);
+      const dismiss = () => {
+        if (problems.get(name) === box) problems.delete(name);
+        removeItem(box, drop);
+      };
+      box.append(element("button", { class: "text-button", type: "button", onClick: dismiss }, translate("Dismiss")));
+      problems.get(name)?.remove();
+      problems.delete(name);
+      problems.set(name, box);
+      alert.append(box);
+      const [[oldest, oldestBox]] = problems;
+      if (problems.size > MAX_PROBLEMS) {
+        oldestBox.remove();
+        problems.delete(oldest);
+      }
+    },
+    clearProblems() {
+      problems.clear();
+      alert.replaceChildren();
     },
   };
 }
@@ -183,51 +189,6 @@ function createToolButton(iconName: IconName, kind: string, name: string, onClic
     { class: `round-button ${kind}`, type: "button", "aria-label": name, title: name, onClick },
     icon(iconName),
   );
-}
-
-/** Append a progress row to `list`, with a button that calls `cancel`. */
-function createProgressRow(
-  list: HTMLElement,
-  kind: "upload" | "download",
-  name: string,
-  cancel: () => void,
-): { show(fraction: number, text: string): void; remove(): void } {
-  const percentage = element("span", {}, formatPercent(0));
-  const fill = element("i", { style: "width: 0" });
-  const [label, cancelLabel] =
-    kind === "upload"
-      ? [translate("Upload of {name}", { name }), translate("Cancel the upload of {name}", { name })]
-      : [translate("Download of {name}", { name }), translate("Cancel the download of {name}", { name })];
-  const bar = element(
-    "div",
-    { class: "progress", role: "progressbar", "aria-label": label, "aria-valuemin": 0, "aria-valuemax": 100 },
-    fill,
-  );
-  const state = element("span", {}, translate("waiting"));
-  const stop = element(
-    "button",
-    { class: "text-button", type: "button", "aria-label": cancelLabel, onClick: cancel },
-    translate("Cancel"),
-  );
-  const row = element(
-    "div",
-    { class: "upload" },
-    element("div", { class: "upload-row" }, element("span", { class: "upload-name", dir: "auto" }, name), percentage),
-    bar,
-  );
-  row.append(element("div", { class: "upload-row" }, state, stop));
-  list.append(row);
-  return {
-    show(fraction, text) {
-      const percent = Math.floor(fraction * 100);
-      setText(percentage, formatPercent(percent / 100));
-      setText(state, text);
-      fill.style.width = `${percent}%`;
-      bar.setAttribute("aria-valuenow", String(percent));
-      bar.setAttribute("aria-valuetext", joinList([text, formatPercent(percent / 100)]));
-    },
-    remove: () => row.remove(),
-  };
 }
 
 /** Accept files dropped anywhere on the page. A gold frame is shown while files are dragged over it. */
