@@ -67,6 +67,10 @@ class StoredMotion:
         """Data messages of the first performer's track, by level and index."""
         return self.packets[0]
 
+    def blocks(self, track: int) -> list[list[bytes]]:
+        """Return the blocks of a track, by level and index, without the headers of their messages."""
+        return [[Data.unpack(packet).block for packet in level] for level in self.packets[track]]
+
     @property
     def total_bytes(self) -> int:
         """Size of all messages."""
@@ -93,14 +97,21 @@ class _ObjectTrack(NamedTuple):
 
 
 def pack_motion(
-    motion_id: str, encoded: EncodedMotion, scenes: Sequence[EncodedScene] = (), others: Sequence[EncodedMotion] = ()
+    motion_id: str,
+    encoded: EncodedMotion,
+    scenes: Sequence[EncodedScene] = (),
+    others: Sequence[EncodedMotion] = (),
+    audio: EncodedAudio | None = None,
 ) -> bytes:
-    """Return the object of a motion: its performers (`encoded`, then `others`), then its cameras and lights.
+    """Return the object of a motion: its performers (`encoded`, then `others`), its cameras and lights, its audio.
 
     Raises ValueError for more than MAX_TRACKS tracks.
     """
-    motions = [_new_track(motion.describe(), motion.ladder) for motion in (encoded, *others)]
-    return _pack_object(motion_id, [*motions, *(_new_track(scene.describe(), scene.ladder) for scene in scenes)])[0]
+    tracks = [_new_track(motion.describe(), motion.ladder) for motion in (encoded, *others)]
+    tracks += [_new_track(scene.describe(), scene.ladder) for scene in scenes]
+    if audio is not None:
+        tracks.append(_new_track(audio.describe(), audio.ladder))
+    return _pack_object(motion_id, tracks)[0]
 
 
 def add_audio_track(motion_id: str, stored: StoredMotion, audio: EncodedAudio) -> tuple[bytes, list[str]]:
@@ -218,8 +229,8 @@ def _new_track(description: dict[str, Any], ladder: Iterable[_Level]) -> _Object
 def _stored_tracks(stored: StoredMotion) -> list[_ObjectTrack]:
     """Return the tracks of a stored motion, their blocks taken out of the Data messages."""
     return [
-        _ObjectTrack(description, [[Data.unpack(packet).block for packet in level] for level in packets])
-        for description, packets in zip(_track_descriptions(stored.description), stored.packets, strict=True)
+        _ObjectTrack(description, stored.blocks(number))
+        for number, description in enumerate(_track_descriptions(stored.description))
     ]
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from starlette.requests import ClientDisconnect, Request
@@ -27,6 +28,8 @@ MAX_UPLOADS_PER_HOLDER = 8
 
 JobFactory = Callable[[bytes], UploadJob]
 """Function that describes the job for a file, from its SHA-256 digest."""
+SourceWriter = Callable[[Path, UploadProgress], Awaitable[UploadJob]]
+"""Function that writes the file of a job and describes the job."""
 
 
 class UploadReceiver:
@@ -56,6 +59,22 @@ class UploadReceiver:
         Meanwhile `get_progress` reports on it by the name `upload`, to the same subject only. Raise `ProblemError`, or
         `ClientDisconnect` if the client disconnects: the job is then cancelled and discarded.
         """
+
+        async def write_source(path: Path, progress: UploadProgress) -> UploadJob:
+            return create_job(await self._write_body(request, path, progress))
+
+        return await self._process(request, upload, write_source)
+
+    async def run(self, request: Request, upload: str | None, job: UploadJob, source: bytes) -> StoreOutcome:
+        """Run a job whose file is `source`, and return the stored motion; the rest is as for `receive`."""
+
+        async def write_source(path: Path, _: UploadProgress) -> UploadJob:
+            await asyncio.to_thread(path.write_bytes, source)
+            return job
+
+        return await self._process(request, upload, write_source)
+
+    async def _process(self, request: Request, upload: str | None, write_source: SourceWriter) -> StoreOutcome:
         subject = access_of(request).subject
         await check_quota(self._context, subject)
         with self._limit.admit(holder_of(request)):
@@ -66,19 +85,19 @@ class UploadReceiver:
                 raise ProblemError(409, "Name in use", detail, field="upload")
             progress = self._progress[key] = UploadProgress()
             try:
-                return await self._receive(request, create_job, progress)
+                with translate_disk_full("this server"), temporary_folder("upload") as folder:
+                    path = folder / "source"
+                    job = await write_source(path, progress)
+                    return await self._run_job(request, job, path, progress)
             finally:
                 del self._progress[key]
 
-    async def _receive(self, request: Request, create_job: JobFactory, progress: UploadProgress) -> StoreOutcome:
-        with translate_disk_full("this server"), temporary_folder("upload") as folder:
-            path = folder / "source"
-            job = create_job(await self._write_body(request, path, progress))
-            try:
-                return await run_until_disconnect(request, self._job_queue.run_job(job, path, progress))
-            except ClientDisconnect:
-                await self._job_queue.discard_job(job.id)
-                raise
+    async def _run_job(self, request: Request, job: UploadJob, path: Path, progress: UploadProgress) -> StoreOutcome:
+        try:
+            return await run_until_disconnect(request, self._job_queue.run_job(job, path, progress))
+        except ClientDisconnect:
+            await self._job_queue.discard_job(job.id)
+            raise
 
     async def _write_body(self, request: Request, path: Path, progress: UploadProgress) -> bytes:
         """Write the body to `path` and return its SHA-256 digest."""
