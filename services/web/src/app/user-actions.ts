@@ -6,6 +6,7 @@ import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
+import type { EditActions } from "../ui/library/motion-editor";
 import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem, uploadAll } from "../ui/library/upload";
 import type { Page, UserActions } from "../ui/page";
@@ -17,6 +18,7 @@ import type { Exporter } from "./exporter";
 import { findFileKind } from "./file-kind";
 import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
+import { createEditedMotion } from "./motion-edit";
 import type { PlaybackController } from "./playback-controller";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
@@ -67,6 +69,8 @@ export function createUserActions(app: AppParts): UserActions {
       if (!confirm(translate('Remove "{name}" from the library?', { name: motion.name }))) return;
       app.library.remove(motion.id).catch((error: unknown) => showProblem(app.page.library, motion.name, error));
     },
+    search: (query) =>
+      app.library.search(query).catch((error: unknown) => showProblem(app.page.library, translate("Library"), error)),
     toggle: (limb) => app.limbs.act("toggle", limb),
     ask: (limb) => app.limbs.act("ask", limb),
     withdraw: (limb) => app.limbs.act("withdraw", limb),
@@ -87,7 +91,11 @@ export function createUserActions(app: AppParts): UserActions {
     labels: (metrics) => app.stageHost.setLabels(metrics),
     mappingShown: () => app.stageHost.pollGamepad(),
     ...(pageAccess.allows("ingest")
-      ? { keep: createPageRecordAction(app), captureTarget: () => captureTarget(app.playback.current) }
+      ? {
+          keep: createPageRecordAction(app),
+          captureTarget: () => captureTarget(app.playback.current),
+          edits: createEditActions(app),
+        }
       : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
@@ -130,6 +138,23 @@ async function openFiles({ page, avatarSlots, playback }: AppParts, files: reado
   const motions = pageAccess.allows("ingest") ? files.filter((_, index) => kinds[index] === "motion") : [];
   if (avatar || motions.length > 0) page.panels.open("library");
   await uploadAll(motions, page.library, (motion) => playback.playUploadedMotion(motion.id));
+}
+
+/** Return the actions of the editor of a motion. */
+function createEditActions(app: AppParts): EditActions {
+  return {
+    label: (motion, labels) =>
+      app.library.label(motion.id, labels).then(
+        () => true,
+        (error: unknown) => {
+          showProblem(app.page.library, motion.name, error);
+          return false;
+        },
+      ),
+    edit: (motion, edit) =>
+      createEditedMotion(motion, edit, app.page.library, (made) => app.playback.playUploadedMotion(made.id)),
+    position: ({ id }) => (app.library.currentItem?.id === id ? (app.playback.current?.position ?? null) : null),
+  };
 }
 
 function webcamStage(app: AppParts): WebcamStage {
