@@ -25,15 +25,18 @@ from bunraku.cli_access import (
 from bunraku.cli_bench import bench
 from bunraku.cli_capture import capture
 from bunraku.cli_inspect import inspect
+from bunraku.cli_library import edit, list_motions, rename, tag
 from bunraku.cli_send import send
 from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
     DEFAULT_SERVER,
     JsonOption,
+    MotionArgument,
     ServerOption,
     TokenOption,
     err,
     out,
+    parse_motion_address,
     parse_resource_address,
     print_plain,
     print_statistics,
@@ -53,11 +56,14 @@ app = typer.Typer(
 app.command()(token)
 app.command()(share)
 app.command()(inspect)
+app.command(name="list")(list_motions)
+app.command()(rename)
+app.command()(tag)
+app.command()(edit)
 app.add_typer(bench, name="bench")
 app.add_typer(capture, name="capture")
 app.add_typer(send, name="send")
 
-MotionArgument = Annotated[str, typer.Argument(help="Id or address of a motion.")]
 ResourceArgument = Annotated[str, typer.Argument(help="Id or address of a motion or session.")]
 SessionArgument = Annotated[str, typer.Argument(help="Id or address of a session.")]
 
@@ -201,7 +207,7 @@ def audio(
     as_json: JsonOption = False,
 ) -> None:
     """Create a motion from another one and a sound that starts with it."""
-    base, motion_id = _parse_motion_address(motion)
+    base, motion_id = parse_motion_address(motion)
     created = _send_file(
         file, base or server, token, as_json, lambda client, *callbacks: client.add_audio(motion_id, file, *callbacks)
     )
@@ -226,7 +232,7 @@ def scene(
 
     from bunraku.client.api import Client
 
-    base, motion_id = _parse_motion_address(motion)
+    base, motion_id = parse_motion_address(motion)
     try:
         staging = json.loads(file.read_bytes())
     except ValueError as error:
@@ -254,7 +260,7 @@ def perform(
     """Create a motion with up to four performers side by side."""
     from bunraku.client.api import Client
 
-    base, motion_id = _parse_motion_address(motion)
+    base, motion_id = parse_motion_address(motion)
 
     async def request() -> dict[str, Any]:
         async with Client(base or server, token) as client:
@@ -265,29 +271,6 @@ def perform(
         out.print_json(data=created)
         return
     print_plain(f"{created['performers']} performers, {created['name']}: {created['id']}")
-
-
-@app.command(name="list")
-def list_motions(server: ServerOption = DEFAULT_SERVER, token: TokenOption = None, as_json: JsonOption = False) -> None:
-    """List the motions of a server."""
-    from rich.table import Table
-
-    from bunraku.client.api import Client
-
-    async def request() -> list[dict[str, Any]]:
-        async with Client(server, token) as client:
-            return await client.motions()
-
-    motions = run_request(request, server)
-    if as_json:
-        out.print_json(data=motions)
-        return
-    table = Table("id", "name", "length", "fps", "rates, kbit/s", "tracks", box=None, header_style="bold")
-    for motion in motions:
-        rates = " ".join(f"{rate['kbps']:.1f}" for rate in motion["rates"])
-        length, tracks = f"{motion['duration']:.1f} s", " ".join(motion["tracks"])
-        table.add_row(motion["id"], motion["name"], length, f"{motion['fps']:g}", rates, tracks)
-    out.print(table)
 
 
 @app.command()
@@ -357,17 +340,6 @@ def warm() -> None:
     from bunraku.session import limb_solver
 
     limb_solver.load_compiled_solver()
-
-
-def _parse_motion_address(address: str) -> tuple[str | None, str]:
-    """Return the server, None if the address is only an id, and the id of a motion.
-
-    Raises `typer.BadParameter` for the address of a session.
-    """
-    base, kind, motion_id = parse_resource_address(address)
-    if kind == "sessions":
-        raise typer.BadParameter("this is the address of a session; give a motion", param_hint="MOTION")
-    return base, motion_id
 
 
 def _send_file(

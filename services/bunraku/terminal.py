@@ -53,6 +53,7 @@ TokenOption = Annotated[
     str | None,
     typer.Option("--token", envvar="BUNRAKU_TOKEN", show_envvar=True, help="Token, if the server requires one."),
 ]
+MotionArgument = Annotated[str, typer.Argument(help="Id or address of a motion.")]
 DEFAULT_SERVER = "http://127.0.0.1:8000"
 
 Result = TypeVar("Result")
@@ -93,6 +94,17 @@ def parse_resource_address(address: str) -> tuple[str | None, str | None, str]:
     if match is None:
         raise typer.BadParameter(f"{address} is not the address of a motion or session")
     return base + match[1], match[2], unquote(match[3])
+
+
+def parse_motion_address(address: str) -> tuple[str | None, str]:
+    """Return the server, None if the address is only an id, and the id of a motion.
+
+    Raises `typer.BadParameter` for the address of a session.
+    """
+    base, kind, motion_id = parse_resource_address(address)
+    if kind == "sessions":
+        raise typer.BadParameter("this is the address of a session; give a motion", param_hint="MOTION")
+    return base, motion_id
 
 
 async def find_resource_kind(client: Client, resource_id: str) -> str:

@@ -70,3 +70,31 @@ async def test_where_nobody_answers_it_says_so() -> None:
 
 def test_socket_addresses_follow_the_servers() -> None:
     assert Client("https://stage.example/here/").socket_url("/v1/x") == "wss://stage.example/here/v1/x"
+
+
+async def test_library_is_searched_labelled_edited_and_drawn(server: str, clip_file: Path) -> None:
+    stages: list[tuple[str, float]] = []
+    async with Client(server) as client:
+        motion = (await client.upload(clip_file))["id"]
+        labelled = await client.update_motion(motion, name="Wasserfall", tags=["water"])
+        assert (labelled["name"], labelled["tags"]) == ("Wasserfall", ["water"])
+        assert (await client.update_motion(motion, tags=["River"]))["name"] == "Wasserfall"
+        assert [found["id"] for found in await client.motions("FALL wasser", tag="river")] == [motion]
+        assert await client.motions(search="wasser", tag="water") == []
+        edited = await client.edit_motion(
+            motion,
+            start=0.1,
+            end=0.5,
+            mirror=True,
+            name="M",
+            on_stage=lambda stage, share: stages.append((stage, share)),
+        )
+        assert (edited["name"], edited["tags"], edited["made_from"]) == ("M", ["River"], motion)
+        assert edited["duration"] == pytest.approx(0.4, abs=0.04)
+        assert (await client.thumbnail(motion)).startswith(b"<svg")
+        with pytest.raises(ServerProblem) as raised:
+            await client.thumbnail("none")
+        assert raised.value.status == 404
+        with pytest.raises(ServerProblem, match="visible"):
+            await client.update_motion(motion, name=" ")
+    assert {stage for stage, _ in stages} <= {"waiting", "reading", "encoding"}

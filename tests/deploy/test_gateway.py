@@ -62,6 +62,8 @@ APPS: dict[str, list[str]] = {
         "/v1/sessions/{session}/stream",
     ],
     "ingest": [
+        "/v1/motions/{motion}/edits",
+        "/v1/motions/{motion}/thumbnail",
         "/v1/motions",
         "/v1/motions/{motion}",
         "/v1/motions/{motion}/audio",

@@ -32,6 +32,7 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("GET", "/v1/docs"): None,
     ("GET", "/v1/motions"): Role.VIEW,
     ("GET", "/v1/motions/{motion}"): Role.VIEW,
+    ("GET", "/v1/motions/{motion}/thumbnail"): Role.VIEW,
     ("GET", "/v1/motions/{motion}/description"): Role.VIEW,
     ("GET", "/v1/motions/{motion}/blocks/{rate}/{index}"): Role.VIEW,
     ("GET", "/v1/sessions"): Role.VIEW,
@@ -51,6 +52,8 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("POST", "/v1/motions/{motion}/audio"): Role.INGEST,
     ("POST", "/v1/motions/{motion}/scene"): Role.INGEST,
     ("POST", "/v1/motions/{motion}/performers"): Role.INGEST,
+    ("POST", "/v1/motions/{motion}/edits"): Role.INGEST,
+    ("PATCH", "/v1/motions/{motion}"): Role.INGEST,
     ("POST", "/v1/performers"): Role.INGEST,
     ("GET", "/v1/performers/{performer}"): Role.INGEST,
     ("DELETE", "/v1/performers/{performer}"): Role.INGEST,
@@ -333,10 +336,16 @@ async def test_bound_token_sees_nothing_but_its_resource(guarded: GuardedServer)
                 assert str(seen_there[0]).replace(hidden, UNKNOWN_ID) == str(seen_not[0])
 
 
-def test_motion_is_deleted_by_its_owner_or_an_admin(guarded: GuardedServer) -> None:
+def test_motion_is_changed_and_deleted_by_its_owner_or_an_admin(guarded: GuardedServer) -> None:
     with httpx2.Client(base_url=guarded.url, timeout=HANG_TIMEOUT_S) as http:
         mine, theirs = (bearer_headers(make_token(Role.INGEST, name)) for name in ("aiko", "ben"))
         made = http.post("/v1/motions?filename=c.bvh", content=make_bvh_clip(1.0, 7), headers=mine).json()["id"]
+        assert http.patch(f"/v1/motions/{made}", json={"name": "mine"}, headers=mine).json()["name"] == "mine"
+        refused = http.patch(f"/v1/motions/{made}", json={"name": "theirs"}, headers=theirs)
+        assert (refused.status_code, refused.json()["needed"]) == (403, "admin")
+        admin = bearer_headers(make_token())
+        assert http.patch(f"/v1/motions/{made}", json={"tags": ["seen"]}, headers=admin).json()["name"] == "mine"
+        assert http.get("/v1/motions?search=mine&tag=seen", headers=theirs).json()["items"][0]["id"] == made
         assert http.delete(f"/v1/motions/{made}", headers=theirs).status_code == 403
         assert http.delete(f"/v1/motions/{made}", headers=mine).status_code == 204
         again = http.post("/v1/motions?filename=c.bvh", content=make_bvh_clip(1.0, 7), headers=mine).json()["id"]

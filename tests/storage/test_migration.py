@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,35 @@ async def test_unversioned_catalogue_is_migrated_with_its_rows(url: str) -> None
     assert await catalogue.get_motion("m1") == CatalogueEntry("m1", 5, {"a": 1})
     await catalogue.close()
     assert await run_in_connection(url, read_schema_version) == HEAD_REVISION
+
+
+async def test_search_columns_of_old_rows_are_filled(url: str) -> None:
+    count = 1_203
+
+    def create_unversioned(connection: Connection) -> None:
+        connection.execute(text("CREATE TABLE motions (id VARCHAR(32) PRIMARY KEY, created BIGINT, description TEXT)"))
+        connection.execute(text("CREATE INDEX ix_motions_created ON motions (created)"))
+        rows = [
+            {"id": f"m{number}", "created": number, "description": json.dumps({"name": f"Ärmel {number}"})}
+            for number in range(count)
+        ]
+        rows += [
+            {"id": "x1", "created": 1, "description": '{"name": "\\ud800\\u0000Z", "tags": ["Q"]}'},
+            {"id": "x2", "created": 1, "description": '{"name": null}'},
+        ]
+        connection.execute(text("INSERT INTO motions VALUES (:id, :created, :description)"), rows)
+
+    def read_columns(connection: Connection) -> dict[str, tuple[str, str]]:
+        rows = connection.execute(text("SELECT id, folded_name, folded_tags FROM motions"))
+        return {row.id: (row.folded_name, row.folded_tags) for row in rows}
+
+    await run_in_connection(url, create_unversioned)
+    catalogue = await SqlCatalogue.open(url)
+    await catalogue.close()
+    columns = await run_in_connection(url, read_columns)
+    assert len(columns) == count + 2
+    assert all(columns[f"m{number}"] == (f"ärmel {number}", "") for number in range(count))
+    assert (columns["x1"], columns["x2"]) == (("z", "\nq\n"), ("", ""))
 
 
 async def test_newer_catalogue_is_rejected_and_unchanged(url: str) -> None:

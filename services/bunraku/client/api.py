@@ -111,10 +111,40 @@ class Client:
         body = {"motions": motions} | ({"places": places} if places is not None else {})
         return await self._request("POST", path, json=body)
 
-    async def motions(self) -> list[dict[str, Any]]:
-        """Return all motions, newest first."""
+    async def edit_motion(
+        self,
+        motion: str,
+        *,
+        start: float = 0.0,
+        end: float | None = None,
+        mirror: bool = False,
+        loop: bool = False,
+        name: str | None = None,
+        on_stage: Callable[[str, float], None] | None = None,
+    ) -> dict[str, Any]:
+        """Create an edited copy of a motion, and wait until it can be watched.
+
+        `start` and `end` cut out a part, in seconds of motion time, rounded to frames. `mirror` exchanges left and
+        right. `loop` blends the end into what precedes the start, so that the repetition is seamless. `name` is that of
+        the copy. `on_stage` is that of `upload`.
+        """
+        body: dict[str, Any] = {"start": round(start * 1e6), "mirror": mirror, "loop": loop}
+        body |= {} if end is None else {"end": round(end * 1e6)}
+        body |= {} if name is None else {"name": name}
+        upload = secrets.token_urlsafe(16)
+        async with self._report_progress(upload, on_stage):
+            return await self._request(
+                "POST", f"/v1/motions/{quote(motion, safe='')}/edits", params={"upload": upload}, json=body
+            )
+
+    async def motions(self, search: str = "", tag: str = "") -> list[dict[str, Any]]:
+        """Return all motions, newest first: those whose name has every word of `search`, and that have the tag `tag`.
+
+        Case is ignored; an empty text selects all.
+        """
         items: list[dict[str, Any]] = []
         params: dict[str, Any] = {"limit": 200}
+        params |= {name: text for name, text in (("search", search), ("tag", tag)) if text}
         while True:
             page = await self._request("GET", "/v1/motions", params=params)
             items += page["items"]
@@ -125,6 +155,22 @@ class Client:
     async def motion(self, motion: str) -> dict[str, Any]:
         """Return one motion."""
         return await self._request("GET", f"/v1/motions/{quote(motion, safe='')}")
+
+    async def update_motion(
+        self, motion: str, *, name: str | None = None, tags: Sequence[str] | None = None
+    ) -> dict[str, Any]:
+        """Change the name or the tags of a motion, at most 16 of up to 40 characters, and return it."""
+        fields = {"name": name, "tags": None if tags is None else list(tags)}
+        body = {key: value for key, value in fields.items() if value is not None}
+        return await self._request("PATCH", f"/v1/motions/{quote(motion, safe='')}", json=body)
+
+    async def thumbnail(self, motion: str) -> bytes:
+        """Return a small picture of a motion as SVG."""
+        response = await self._http.get(f"/v1/motions/{quote(motion, safe='')}/thumbnail")
+        if not response.is_success:
+            body = self._parse_body(response)
+            raise ServerProblem(response.status_code, body if isinstance(body, dict) else {})
+        return response.content
 
     async def delete_motion(self, motion: str) -> None:
         """Delete one motion."""
@@ -237,8 +283,7 @@ class Client:
                     if progress is not None:
                         progress(sent, size)
 
-        polling = asyncio.create_task(self._poll_progress(name, on_stage)) if on_stage is not None else None
-        try:
+        async with self._report_progress(name, on_stage):
             return await self._request(
                 "POST",
                 endpoint,
@@ -246,10 +291,19 @@ class Client:
                 content=chunks(),
                 headers={"Content-Length": str(size), "Content-Type": "application/octet-stream"},
             )
+
+    @contextlib.asynccontextmanager
+    async def _report_progress(self, upload: str, on_stage: Callable[[str, float], None] | None) -> AsyncIterator[None]:
+        """Report the progress of an upload during the block."""
+        if on_stage is None:
+            yield
+            return
+        polling = asyncio.create_task(self._poll_progress(upload, on_stage))
+        try:
+            yield
         finally:
-            if polling is not None:
-                polling.cancel()
-                await asyncio.wait((polling,))
+            polling.cancel()
+            await asyncio.wait((polling,))
 
     async def _poll_progress(self, upload: str, on_stage: Callable[[str, float], None]) -> None:
         """Report the progress of an upload until cancelled. Failures are ignored: the upload's own answer counts."""
@@ -265,13 +319,16 @@ class Client:
         response = await self._http.request(method, path, **options)
         if response.status_code == 204:
             return {}
-        try:
-            body = response.json()
-        except ValueError:
-            body = {
-                "title": "Not a Bunraku server",
-                "detail": f"{self.url} answered {response.status_code} without JSON",
-            }
+        body = self._parse_body(response)
         if not response.is_success or not isinstance(body, dict):
             raise ServerProblem(response.status_code, body if isinstance(body, dict) else {})
         return body
+
+    def _parse_body(self, response: httpx2.Response) -> Any:
+        try:
+            return response.json()
+        except ValueError:
+            return {
+                "title": "Not a Bunraku server",
+                "detail": f"{self.url} answered {response.status_code} without JSON",
+            }

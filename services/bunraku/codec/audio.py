@@ -130,6 +130,36 @@ def pack_audio_block(first_number: int, packets: Sequence[bytes]) -> bytes:
     return block
 
 
+def cut_audio(
+    track: AudioTrack, ladder: Sequence[Sequence[bytes]], timing: Timing, first_sample: int
+) -> EncodedAudio | None:
+    """Return the sound from `first_sample` on for a motion with this timing; None if it has ended before.
+
+    The packets keep their bytes, so that nothing is lost. At least one packet before the cut is kept, in the pre-skip:
+    in it the decoder converges (RFC 6716, 4.5), and the cut is at the exact sample.
+
+    Args:
+        track: Track of the whole sound.
+        ladder: Its blocks, by level and index.
+        timing: Timing of the motion that is cut out.
+        first_sample: Sample of the whole sound with which the cut one begins, at least 0.
+
+    Raises:
+        DamagedBlock: A block is damaged.
+    """
+    samples = min(track.samples - first_sample, max_samples(timing))
+    if samples <= 0:
+        return None
+    first_packet = max((first_sample + track.pre_skip) // PACKET_SAMPLES - 1, 0)
+    pre_skip = first_sample + track.pre_skip - PACKET_SAMPLES * first_packet
+    cut = create_audio_track(timing, track.channels, pre_skip, samples)
+    levels = []
+    for blocks in ladder:
+        packets = [packet.data for block in blocks for packet in unpack_audio_block(block)]
+        levels.append(pack_audio_level(cut, packets[first_packet : first_packet + cut.packet_count]))
+    return EncodedAudio(cut, levels)
+
+
 def unpack_audio_block(data: bytes) -> list[AudioPacket]:
     """Return the packets of one block. Raises `DamagedBlock`."""
     if len(data) > MAX_BLOCK_BYTES:

@@ -69,6 +69,10 @@ class StoredMotion:
         """Data messages of the first performer's track, by level and index."""
         return self.packets[0]
 
+    def blocks(self, track: int) -> list[list[bytes]]:
+        """Return the blocks of a track, by level and index, without the headers of their messages."""
+        return [[Data.unpack(packet).block for packet in level] for level in self.packets[track]]
+
     @property
     def total_bytes(self) -> int:
         """Size of all messages."""
@@ -107,12 +111,13 @@ def pack_motion(
     scenes: Sequence[EncodedScene] = (),
     others: Sequence[EncodedMotion] = (),
     extensions: Sequence[EncodedExtension] = (),
+    audio: EncodedAudio | None = None,
 ) -> bytes:
-    """Return the object of a motion: performers (`encoded`, then `others`), cameras and lights, then extensions.
+    """Return the object of a motion: performers (`encoded`, then `others`), cameras and lights, audio, extensions.
 
     Raises ValueError for more than MAX_TRACKS tracks.
     """
-    tracks: list[_EncodedTrack] = [encoded, *others, *scenes, *extensions]
+    tracks: list[_EncodedTrack] = [encoded, *others, *scenes, *([audio] if audio is not None else []), *extensions]
     return _pack_object(motion_id, [_new_track(track.describe(), track.ladder) for track in tracks])[0]
 
 
@@ -255,8 +260,8 @@ def _new_track(description: dict[str, Any], ladder: Iterable[_Level]) -> _Object
 def _stored_tracks(stored: StoredMotion) -> list[_ObjectTrack]:
     """Return the tracks of a stored motion, their blocks taken out of the Data messages."""
     return [
-        _ObjectTrack(description, [[Data.unpack(packet).block for packet in level] for level in packets])
-        for description, packets in zip(_track_descriptions(stored.description), stored.packets, strict=True)
+        _ObjectTrack(description, stored.blocks(number))
+        for number, description in enumerate(_track_descriptions(stored.description))
     ]
 
 

@@ -11,6 +11,7 @@ from fastapi import Depends, FastAPI, Header, Request, Response
 from bunraku import __version__
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, requires
+from bunraku.http.immutable_resource import immutable_headers, not_modified
 from bunraku.http.large_body import BodySource, LargeBodies, large_response
 from bunraku.ik import batch
 from bunraku.ik.resource_cache import CachedResource, ResourceCache
@@ -18,8 +19,6 @@ from bunraku.marionette import bend_table, figures
 from bunraku.marionette.proportions import Proportions
 from bunraku.runtime import worker_process
 from bunraku.runtime.problem import ProblemError
-
-IMMUTABLE_CACHE_CONTROL = "public, max-age=31536000, immutable"
 
 worker_process.preload_modules("bunraku.ik.batch")
 
@@ -106,13 +105,5 @@ def create_app() -> FastAPI:
 
 def _resource_response(stored: CachedResource, media_type: str, if_none_match: str | None) -> Response:
     """Return an immutable resource, or 304 if the client has it."""
-    headers = {"ETag": stored.etag, "Cache-Control": IMMUTABLE_CACHE_CONTROL}
-    if if_none_match is not None and _etag_matches(if_none_match, stored.etag):
-        return Response(status_code=304, headers=headers)
-    return Response(stored.data, headers=headers, media_type=media_type)
-
-
-def _etag_matches(header: str, etag: str) -> bool:
-    """Return whether If-None-Match matches `etag` by weak comparison (RFC 9110, 13.1.2)."""
-    tags = [tag.strip().removeprefix("W/") for tag in header.split(",")]
-    return "*" in tags or etag in tags
+    unchanged = not_modified(if_none_match, stored.etag)
+    return unchanged or Response(stored.data, headers=immutable_headers(stored.etag), media_type=media_type)

@@ -8,20 +8,23 @@ from contextlib import asynccontextmanager
 from functools import partial
 from typing import Annotated, Any, Literal
 
-from fastapi import Depends, FastAPI, Path, Query, Request, Response
+from fastapi import Depends, FastAPI, Header, Path, Query, Request, Response
 from fastapi.responses import JSONResponse
 
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.disconnect import run_until_disconnect
+from bunraku.http.immutable_resource import immutable_headers, not_modified
 from bunraku.http.large_body import BodySource
 from bunraku.http.openapi import request_body
 from bunraku.http.problem_details import motion_not_found
 from bunraku.ingest.audio import AudioOperation, create_audio_job
+from bunraku.ingest.edit import EditOperation, EditRequest, create_edit_job
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_queue import JobQueue
 from bunraku.ingest.keyframe import MAX_BODY_BYTES as MAX_SCENE_BODY_BYTES
 from bunraku.ingest.keyframe import Staging
+from bunraku.ingest.labels import MAX_LABELS_BYTES, MAX_TAG_CHARACTERS, Labels, require_ownership
 from bunraku.ingest.metrics import register_metrics
 from bunraku.ingest.motion import MotionOperation, create_motion_job
 from bunraku.ingest.performance import PerformanceOperation
@@ -31,12 +34,14 @@ from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.recording import RecordingOperation
 from bunraku.ingest.scene import SceneOperation
 from bunraku.ingest.takes import TakesOperation, create_takes_job
+from bunraku.ingest.thumbnail import CONTENT_SECURITY_POLICY, Thumbnails
 from bunraku.ingest.upload import UploadReceiver
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.recording_request import RECORDING_SUBJECT
 from bunraku.runtime.context import ServiceContext
+from bunraku.runtime.display_text import MAX_NAME_CHARACTERS
 from bunraku.runtime.problem import ProblemError
-from bunraku.storage.record import InvalidCursor
+from bunraku.storage.record import CatalogueEntry, InvalidCursor, MotionFilter
 from bunraku.storage.removal import remove_motion
 
 UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
@@ -59,7 +64,14 @@ def create_app(context: ServiceContext) -> FastAPI:
     recordings = RecordingOperation(context, worker_slots)
     performances = PerformanceOperation(context, worker_slots)
     takes_operation = TakesOperation(context, worker_slots, motions)
-    handlers = {"motion": motions.run_job, "takes": takes_operation.run_job, "audio": soundtracks.run_job}
+    edits = EditOperation(context, worker_slots)
+    thumbnails = Thumbnails(context)
+    handlers = {
+        "motion": motions.run_job,
+        "takes": takes_operation.run_job,
+        "audio": soundtracks.run_job,
+        "edit": edits.run_job,
+    }
     job_queue = JobQueue(context, worker_slots, handlers)
     uploads = UploadReceiver(context, job_queue)
 
@@ -159,6 +171,20 @@ def create_app(context: ServiceContext) -> FastAPI:
         derivation = performers.add_performers(motion, body, access_of(request).subject)
         return _stored_response(await run_until_disconnect(request, derivation))
 
+    @app.post("/v1/motions/{motion}/edits", status_code=201, tags=["motions"])
+    @requires(Role.INGEST)
+    async def edit(motion: str, body: EditRequest, request: Request, upload: UploadName = None) -> Response:
+        """Create an edited copy of a motion: a part of it, its mirror image, or a seamless loop.
+
+        Times are rounded to frames. Sound, camera and lights are cut, and mirrored, in the same way. The original stays
+        unchanged; the same edit again returns the same new motion with 200. `upload` is the same as for uploads.
+        """
+        await edits.check(motion, body)
+        job = create_edit_job(motion, body, access_of(request).subject)
+        return _stored_response(
+            await uploads.run(request, upload, job, body.model_dump_json().encode(), job_queue.run_job)
+        )
+
     @app.get("/v1/uploads/{upload}", tags=["motions"])
     @requires(Role.INGEST)
     async def progress(
@@ -180,10 +206,13 @@ def create_app(context: ServiceContext) -> FastAPI:
         request: Request,
         limit: Annotated[int, Query(ge=1, le=200)] = 50,
         cursor: Annotated[str | None, Query(max_length=200)] = None,
+        search: Annotated[str, Query(max_length=MAX_NAME_CHARACTERS)] = "",
+        tag: Annotated[str, Query(max_length=MAX_TAG_CHARACTERS)] = "",
     ) -> dict[str, Any]:
         """Return motions, newest first; `next` is the cursor of the next page.
 
-        A viewer link for one session or motion gets only its motion.
+        With `search`, only those whose name has every word of it, in any part; with `tag`, only those with this tag.
+        Case is ignored. A viewer link for one session or motion gets only its motion, whatever is searched.
         """
         access = access_of(request)
         if access.is_bound:
@@ -193,7 +222,7 @@ def create_app(context: ServiceContext) -> FastAPI:
             entry = None if motion_id is None else await context.catalogue.get_motion(motion_id)
             return {"items": [] if entry is None else [entry_json(entry)], "next": None}
         try:
-            entries, next_cursor = await context.catalogue.list_motions(limit, cursor)
+            entries, next_cursor = await context.catalogue.list_motions(limit, cursor, MotionFilter(search, tag))
         except InvalidCursor as error:
             raise ProblemError(422, "Bad cursor", str(error), field="cursor") from None
         return {"items": [entry_json(entry) for entry in entries], "next": next_cursor}
@@ -207,16 +236,49 @@ def create_app(context: ServiceContext) -> FastAPI:
             raise motion_not_found(motion)
         return entry_json(entry)
 
+    @app.get(
+        "/v1/motions/{motion}/thumbnail",
+        tags=["motions"],
+        response_class=Response,
+        responses={
+            200: {"content": {"image/svg+xml": {}}, "description": "SVG"},
+            304: {"description": "not modified"},
+        },
+    )
+    @requires(Role.VIEW)
+    async def thumbnail(
+        motion: str, request: Request, if_none_match: Annotated[str | None, Header()] = None
+    ) -> Response:
+        """Return a small picture of all performers in the middle of the motion, seen from the front."""
+        etag = await thumbnails.etag(motion)
+        if (unchanged := not_modified(if_none_match, etag)) is not None:
+            return unchanged
+        headers = {**immutable_headers(etag), "Content-Security-Policy": CONTENT_SECURITY_POLICY}
+        return Response(await thumbnails.get(motion, request), headers=headers, media_type="image/svg+xml")
+
+    @app.patch("/v1/motions/{motion}", tags=["motions"])
+    @requires(Role.INGEST, max_body_bytes=MAX_LABELS_BYTES)
+    async def edit_labels(motion: str, body: Labels, request: Request) -> dict[str, Any]:
+        """Change name or tags of a motion. Without the role admin, only of motions of one's subject."""
+        access = access_of(request)
+
+        def apply(entry: CatalogueEntry) -> dict[str, Any]:
+            require_ownership(access, entry, "changing")
+            return body.apply(entry.description)
+
+        entry = await context.catalogue.edit_motion(motion, apply)
+        if entry is None:
+            raise motion_not_found(motion)
+        return entry_json(entry)
+
     @app.delete("/v1/motions/{motion}", status_code=204, tags=["motions"])
     @requires(Role.INGEST)
     async def remove(motion: str, request: Request) -> None:
         """Remove a motion; sessions that play it continue. Without the role admin, only motions of one's subject."""
-        access, entry = access_of(request), await context.catalogue.get_motion(motion)
+        entry = await context.catalogue.get_motion(motion)
         if entry is None:
             raise motion_not_found(motion)
-        if access.role < Role.ADMIN and entry.subject != access.subject:
-            detail = f"{motion} was stored by another subject; removing it needs the role admin"
-            raise ProblemError(403, "Not allowed", detail, needed="admin")
+        require_ownership(access_of(request), entry, "removing")
         if not await remove_motion(context.catalogue, context.motion_store, motion):
             raise motion_not_found(motion)
 

@@ -74,8 +74,5 @@ class DerivedMotionFactory:
             # loaded only now, as the source may have been removed while this waited
             outcome = await derivation.run(motion_id, await self.require_object(derivation.source_id))
         result = require_result(outcome, **derivation.problem_members)
-        if known is not None:
-            # its object is missing, or in a codec of an older release
-            await context.catalogue.remove_motion(motion_id)
         description = await derivation.describe(source, result)
-        return await store_motion(context, motion_id, result, description, derivation.subject)
+        return await store_motion(context, motion_id, result, description, derivation.subject, known)

@@ -11,4 +11,4 @@ from bunraku.storage.record import CatalogueEntry
 def entry_json(entry: CatalogueEntry) -> dict[str, Any]:
     """Return a motion as the API describes it."""
     created = format_timestamp(entry.created / 1e6, "milliseconds")
-    return {"id": entry.id, "created": created, "tracks": ["motion"], **entry.description}
+    return {"id": entry.id, "created": created, "tracks": ["motion"], "tags": [], **entry.description}

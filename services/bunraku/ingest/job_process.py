@@ -27,6 +27,7 @@ class JobKind(StrEnum):
     SCENE = "dress"
     PERFORMERS = "gather"
     PERFORMANCE = "perform"
+    EDIT = "edit"
 
 
 worker_process.preload_modules(
@@ -36,6 +37,7 @@ worker_process.preload_modules(
     "bunraku.ingest.jobs.scene",
     "bunraku.ingest.jobs.performers",
     "bunraku.ingest.jobs.performance",
+    "bunraku.ingest.jobs.edit",
 )
 
 
@@ -92,6 +94,13 @@ _FAILURE_TEXTS: dict[JobKind, _FailureTexts] = {
         "encoding this performance crashed",
         "please report it",
     ),
+    JobKind.EDIT: _FailureTexts(
+        "Too much motion",
+        "cut out a shorter part",
+        "Unreadable motion",
+        "editing this motion crashed",
+        "please report it",
+    ),
 }
 
 
@@ -141,6 +150,7 @@ def _call_list_takes(path: Path, limit: int) -> TakeList | JobRejection:
 def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
     """Call the function of a job, in the worker process."""
     from bunraku.ingest.jobs.audio import add_audio
+    from bunraku.ingest.jobs.edit import edit_motion
     from bunraku.ingest.jobs.motion import encode_file
     from bunraku.ingest.jobs.performance import encode_performance
     from bunraku.ingest.jobs.performers import combine_performers
@@ -154,5 +164,6 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
         JobKind.SCENE: add_scene_of_body,
         JobKind.PERFORMERS: combine_performers,
         JobKind.PERFORMANCE: encode_performance,
+        JobKind.EDIT: edit_motion,
     }
     return functions[kind](*arguments)

@@ -70,10 +70,7 @@ class MotionOperation:
             "bytes": await asyncio.to_thread(os.path.getsize, source.path),
             **result.description,
         }
-        if known is not None:
-            # its object is missing, or in a codec of an older release
-            await self._context.catalogue.remove_motion(motion_id)
-        return await store_motion(self._context, motion_id, result, description, source.subject)
+        return await store_motion(self._context, motion_id, result, description, source.subject, known)
 
 
 def _name_motion(source: SourceFile) -> str:

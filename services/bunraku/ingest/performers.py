@@ -13,6 +13,7 @@ from bunraku.http.admission import AdmissionLimit
 from bunraku.http.problem_details import invalid_field_problem
 from bunraku.ingest.derived_motion import Derivation, DerivedMotionFactory
 from bunraku.ingest.job_process import JobKind
+from bunraku.ingest.labels import combined_tags
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.ingest.worker_slots import WorkerSlots
@@ -76,6 +77,7 @@ class PerformersOperation:
                 **base.description,
                 **result.description,
                 "name": combined_name(motion_names),
+                "tags": combined_tags((base, *others)),
                 "pieces": motion_names,
                 "rates": combined_ladder([entry.description["rates"] for entry in (base, *others)]),
             }

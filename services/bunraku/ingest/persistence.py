@@ -29,13 +29,22 @@ async def check_quota(context: ServiceContext, subject: str) -> None:
 
 
 async def store_motion(
-    context: ServiceContext, motion_id: str, result: JobResult, description: dict[str, Any], subject: str
+    context: ServiceContext,
+    motion_id: str,
+    result: JobResult,
+    description: dict[str, Any],
+    subject: str,
+    replaced: CatalogueEntry | None = None,
 ) -> StoreOutcome:
     """Store a motion for `subject`; raise `ProblemError` (403), with nothing stored, if a quota is used up.
 
-    If an entry of this id exists, it stays unchanged and is returned.
+    If an entry of this id exists, it stays unchanged and is returned. `replaced` is one whose object is missing or in a
+    codec of an older release: it is removed, and its subject keeps the name and tags.
     """
     entry = CatalogueEntry(motion_id, context.clock(), description, subject, len(result.packed))
+    if replaced is not None:
+        entry = entry.with_edits_of(replaced)
+        await context.catalogue.remove_motion(motion_id)
     # the object first: every entry then has its object, and an object without an entry is harmless
     await context.motion_store.put(motion_id, result.packed)
     try:
@@ -44,13 +53,11 @@ async def store_motion(
         if await context.catalogue.get_motion(motion_id) is None:
             await context.motion_store.remove(motion_id)
         raise _quota_problem(error) from None
-    if is_new:
-        if (await context.motion_store.object_sizes([motion_id]))[0] is None:
-            # a removal of the same motion at the same time has taken the object, and then the row that was there
-            await context.motion_store.put(motion_id, result.packed)
-    else:
-        entry = await context.catalogue.get_motion(motion_id) or entry
-    return StoreOutcome(entry, is_new)
+    if is_new and (await context.motion_store.object_sizes([motion_id]))[0] is None:
+        # a removal of the same motion at the same time has taken the object, and then the row that was there
+        await context.motion_store.put(motion_id, result.packed)
+    # an existing entry, or the labels of an incomplete one
+    return StoreOutcome(await context.catalogue.get_motion(motion_id) or entry, is_new)
 
 
 def _quota_problem(error: QuotaExceeded) -> ProblemError:

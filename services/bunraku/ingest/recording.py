@@ -36,8 +36,8 @@ MAX_ACTIVE_RECORDINGS = 8
 MAX_RECORDINGS_PER_SUBJECT = 2
 RECORDING_TIMEOUT_S = 100.0
 """Time limit of a recording, including the wait for a worker slot: the session service waits for 120 s."""
-INHERITED_FIELDS = ("profile", "joints", "rest_pose", "unit", "guessed", "fit", "extension")
-"""Members of a description that concern the skeleton, copied from the played motion."""
+INHERITED_FIELDS = ("profile", "joints", "rest_pose", "unit", "guessed", "fit", "extension", "tags")
+"""Members of a description that concern the skeleton, and the tags, copied from the played motion."""
 
 
 class RecordingOperation:

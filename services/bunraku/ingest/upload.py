@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import secrets
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,6 +32,8 @@ JobFactory = Callable[[bytes], UploadJob]
 """Function that describes the job for a file, from its SHA-256 digest."""
 JobRunner = Callable[[UploadJob, Path, UploadProgress], Coroutine[Any, Any, Outcome]]
 """Function that persists and runs a job on a received file."""
+SourceWriter = Callable[[Path, UploadProgress], Awaitable[UploadJob]]
+"""Function that writes the file of a job and describes the job."""
 
 
 class UploadReceiver:
@@ -62,6 +65,26 @@ class UploadReceiver:
         Meanwhile `get_progress` reports on it by the name `upload`, to the same subject only. Raise `ProblemError`, or
         `ClientDisconnect` if the client disconnects: the job is then cancelled and discarded.
         """
+
+        async def write_source(path: Path, progress: UploadProgress) -> UploadJob:
+            return create_job(await self._write_body(request, path, progress))
+
+        return await self._process(request, upload, write_source, run_job)
+
+    async def run(
+        self, request: Request, upload: str | None, job: UploadJob, source: bytes, run_job: JobRunner[Outcome]
+    ) -> Outcome:
+        """Run a job whose file is `source`, and return what it stored; the rest is as for `receive`."""
+
+        async def write_source(path: Path, _: UploadProgress) -> UploadJob:
+            await asyncio.to_thread(path.write_bytes, source)
+            return job
+
+        return await self._process(request, upload, write_source, run_job)
+
+    async def _process(
+        self, request: Request, upload: str | None, write_source: SourceWriter, run_job: JobRunner[Outcome]
+    ) -> Outcome:
         subject = access_of(request).subject
         await check_quota(self._context, subject)
         with self._limit.admit(holder_of(request)):
@@ -72,21 +95,19 @@ class UploadReceiver:
                 raise ProblemError(409, "Name in use", detail, field="upload")
             progress = self._progress[key] = UploadProgress()
             try:
-                return await self._receive(request, create_job, run_job, progress)
+                with translate_disk_full("this server"), temporary_folder("upload") as folder:
+                    path = folder / "source"
+                    job = await write_source(path, progress)
+                    return await self._run_job(request, job, run_job(job, path, progress))
             finally:
                 del self._progress[key]
 
-    async def _receive(
-        self, request: Request, create_job: JobFactory, run_job: JobRunner[Outcome], progress: UploadProgress
-    ) -> Outcome:
-        with translate_disk_full("this server"), temporary_folder("upload") as folder:
-            path = folder / "source"
-            job = create_job(await self._write_body(request, path, progress))
-            try:
-                return await run_until_disconnect(request, run_job(job, path, progress))
-            except ClientDisconnect:
-                await self._job_queue.discard_job(job.id)
-                raise
+    async def _run_job(self, request: Request, job: UploadJob, run: Coroutine[Any, Any, Outcome]) -> Outcome:
+        try:
+            return await run_until_disconnect(request, run)
+        except ClientDisconnect:
+            await self._job_queue.discard_job(job.id)
+            raise
 
     async def _write_body(self, request: Request, path: Path, progress: UploadProgress) -> bytes:
         """Write the body to `path` and return its SHA-256 digest."""

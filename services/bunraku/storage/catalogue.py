@@ -7,10 +7,10 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from bunraku.storage.postgres_url import split_tls_options
-from bunraku.storage.record import CatalogueEntry, Job, JobHold, Quota, Share, ShareScope
+from bunraku.storage.record import CatalogueEntry, Job, JobHold, MotionFilter, Quota, Share, ShareScope
 
 if TYPE_CHECKING:
-    from bunraku.storage.catalogue_sql import MotionKey, SqlCatalogue
+    from bunraku.storage.catalogue_sql import DescriptionEdit, MotionKey, SqlCatalogue
 
 URL_SCHEMES = ("sqlite", "postgresql")
 
@@ -51,11 +51,12 @@ class Catalogue:
     async def add_motion(self, entry: CatalogueEntry, quota: Quota | None = None) -> bool:
         """Add a motion and return whether it is new; raise `QuotaExceeded`, with nothing added, beyond `quota`.
 
-        It replaces a motion of the same id that is incomplete.
+        It replaces a motion of the same id that is incomplete, and keeps its name and tags.
         """
         tables = await self.open()
         known = await tables.get_motion(entry.id) if self._incomplete_motions else None
         if known is not None and self._is_incomplete(known):
+            entry = entry.with_edits_of(known)
             await tables.remove_motion(entry.id)
         return await tables.add_motion(entry, quota)
 
@@ -68,13 +69,24 @@ class Catalogue:
         entry = await (await self.open()).get_motion(motion_id)
         return None if entry is None or self._is_incomplete(entry) else entry
 
-    async def list_motions(self, limit: int, cursor: str | None = None) -> tuple[list[CatalogueEntry], str | None]:
+    async def list_motions(
+        self, limit: int, cursor: str | None = None, condition: MotionFilter | None = None
+    ) -> tuple[list[CatalogueEntry], str | None]:
         """Return at most `limit` motions, newest first, and the next page's cursor; raise `InvalidCursor`.
 
         A page has fewer motions if some of them are incomplete.
         """
-        entries, following = await (await self.open()).list_motions(limit, cursor)
+        entries, following = await (await self.open()).list_motions(limit, cursor, condition or MotionFilter())
         return [entry for entry in entries if not self._is_incomplete(entry)], following
+
+    async def edit_motion(self, motion_id: str, edit: DescriptionEdit) -> CatalogueEntry | None:
+        """Replace the description of a motion by what `edit` returns for its entry; return the new entry.
+
+        Return None if the motion does not exist or is incomplete. Concurrent edits follow one another.
+        """
+        if await self.get_motion(motion_id) is None:
+            return None
+        return await (await self.open()).edit_motion(motion_id, edit)
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""

@@ -8,10 +8,11 @@ import binascii
 import json
 import sqlite3
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
-from sqlalchemy import Column, Row, delete, event, func, select, text, tuple_
+from sqlalchemy import Column, Row, delete, event, func, select, text, tuple_, update
 from sqlalchemy.exc import DBAPIError, IntegrityError, OperationalError
 from sqlalchemy.exc import TimeoutError as NoConnection
 from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
@@ -22,7 +23,8 @@ from bunraku.runtime.problem import ProblemError
 from bunraku.storage.engine import create_engine
 from bunraku.storage.job_sql import SqlJobTable
 from bunraku.storage.migration import HEAD_REVISION, migrate, read_schema_version
-from bunraku.storage.record import CatalogueEntry, InvalidCursor, Quota, QuotaExceeded, is_motion_id
+from bunraku.storage.record import CatalogueEntry, InvalidCursor, MotionFilter, Quota, QuotaExceeded, is_motion_id
+from bunraku.storage.search_text import fold_tag, fold_text, search_columns
 from bunraku.storage.share_sql import SqlShareTable
 from bunraku.storage.space_reserve import SpaceReserve
 from bunraku.storage.table import JOBS, MOTIONS
@@ -35,10 +37,15 @@ _CALLER_SQLSTATES = ("22", "23", "42", "53100")
 _DISK_FULL_SQLSTATE = "53100"
 _SQLITE_SPACE_ERRORS = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN)
 """Primary result codes of SQLite when a disk or quota is full: besides FULL, those of a journal that cannot be made."""
+ALL_MOTIONS = MotionFilter()
+_FILL_CHUNK_ROWS = 500
+"""Rows without search columns that are filled in one transaction."""
 RESERVE_SUFFIX = "-reserve"
 """Suffix of the file of reserved space beside an SQLite database."""
 
 Result = TypeVar("Result")
+DescriptionEdit = Callable[[CatalogueEntry], dict[str, Any]]
+"""Function that returns the new description of a motion, or raises; it may be called again after another edit."""
 
 
 class MotionKey(NamedTuple):
@@ -118,9 +125,25 @@ class SqlCatalogue:
         """Return a motion, None if it does not exist."""
         return await self._run_query(self._select_motion(motion_id)) if is_motion_id(motion_id) else None
 
-    async def list_motions(self, limit: int, cursor: str | None = None) -> tuple[list[CatalogueEntry], str | None]:
-        """Return at most `limit` motions, newest first, and the next page's cursor; raise `InvalidCursor`."""
-        return await self._run_query(self._select_motions(limit, _parse_cursor(cursor) if cursor is not None else None))
+    async def list_motions(
+        self, limit: int, cursor: str | None = None, condition: MotionFilter = ALL_MOTIONS
+    ) -> tuple[list[CatalogueEntry], str | None]:
+        """Return at most `limit` motions, newest first, and the next page's cursor; raise `InvalidCursor`.
+
+        A cursor is a position in the list of all motions: it stays valid whatever is added, removed or renamed.
+        """
+        after = _parse_cursor(cursor) if cursor is not None else None
+        if condition != ALL_MOTIONS:
+            while await self._run_query(self._fill_search_columns()):
+                pass
+        return await self._run_query(self._select_motions(limit, after, condition))
+
+    async def edit_motion(self, motion_id: str, edit: DescriptionEdit) -> CatalogueEntry | None:
+        """Replace the description of a motion and return its entry, None if it does not exist.
+
+        Concurrent edits follow one another: none is lost.
+        """
+        return await self._run_query(self._update_description(motion_id, edit)) if is_motion_id(motion_id) else None
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""
@@ -145,6 +168,7 @@ class SqlCatalogue:
             "description": json.dumps(entry.description),
             "subject": entry.subject,
             "bytes": entry.bytes,
+            **search_columns(entry.description),
         }
         try:
             async with self._engine.begin() as connection:
@@ -168,10 +192,40 @@ class SqlCatalogue:
             row = (await connection.execute(select(MOTIONS).where(MOTIONS.c.id == motion_id))).first()
         return _entry_from_row(row) if row is not None else None
 
+    async def _update_description(self, motion_id: str, edit: DescriptionEdit) -> CatalogueEntry | None:
+        while True:
+            async with self._engine.begin() as connection:
+                row = (await connection.execute(select(MOTIONS).where(MOTIONS.c.id == motion_id))).first()
+                if row is None:
+                    return None
+                entry = _entry_from_row(row)
+                description = edit(entry)
+                # only if the row is unchanged: the same statement works in both databases, without a lock
+                unchanged = (MOTIONS.c.id == motion_id, MOTIONS.c.description == row.description)
+                statement = update(MOTIONS).where(*unchanged, MOTIONS.c.created == row.created)
+                values = {"description": json.dumps(description), **search_columns(description)}
+                if (await connection.execute(statement.values(values))).rowcount:
+                    return replace(entry, description=description)
+
+    async def _fill_search_columns(self) -> bool:
+        """Fill the search columns of rows that a replica of an older release added; return whether more may follow."""
+        async with self._engine.begin() as connection:
+            statement = select(MOTIONS.c.id, MOTIONS.c.description).where(MOTIONS.c.folded_name.is_(None))
+            rows = (await connection.execute(statement.limit(_FILL_CHUNK_ROWS))).all()
+            for row in rows:
+                unchanged = (MOTIONS.c.id == row.id, MOTIONS.c.description == row.description)
+                values = search_columns(json.loads(row.description))
+                await connection.execute(update(MOTIONS).where(*unchanged).values(values))
+        return len(rows) == _FILL_CHUNK_ROWS
+
     async def _select_motions(
-        self, limit: int, after: tuple[int, str] | None
+        self, limit: int, after: tuple[int, str] | None, condition: MotionFilter
     ) -> tuple[list[CatalogueEntry], str | None]:
         statement = select(MOTIONS).order_by(MOTIONS.c.created.desc(), MOTIONS.c.id.desc()).limit(limit + 1)
+        for word in fold_text(condition.search).split():
+            statement = statement.where(MOTIONS.c.folded_name.contains(word, autoescape=True))
+        if condition.tag:
+            statement = statement.where(MOTIONS.c.folded_tags.contains(fold_tag(condition.tag), autoescape=True))
         if after is not None:
             statement = statement.where(tuple_(MOTIONS.c.created, MOTIONS.c.id) < tuple_(*after))
         async with self._engine.connect() as connection:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple, Self
 
+EDITABLE_FIELDS = ("name", "tags")
+"""Members of a motion's description that its subject may change."""
 _MOTION_ID_PATTERN = re.compile(r"[A-Za-z0-9]{1,64}")
 
 
@@ -35,6 +37,23 @@ class CatalogueEntry:
     """Subject of the token with which it was stored."""
     bytes: int = 0
     """Size of the stored object."""
+
+    def with_edits_of(self, replaced: CatalogueEntry) -> Self:
+        """Return this entry with the name and tags of the entry of the same subject that it replaces."""
+        if self.subject != replaced.subject:
+            return self
+        kept = {key: replaced.description[key] for key in EDITABLE_FIELDS if key in replaced.description}
+        return replace(self, description={**self.description, **kept})
+
+
+class MotionFilter(NamedTuple):
+    """Condition on listed motions. Every word of `search` occurs in the name; one of the tags is `tag`.
+
+    Both ignore case; an empty text is no condition.
+    """
+
+    search: str = ""
+    tag: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,8 @@ MOTIONS = Table(
     Column("description", Text, nullable=False),
     Column("subject", String(64), nullable=True, index=True),
     Column("bytes", BigInteger, nullable=True),
+    Column("folded_name", Text, nullable=True),
+    Column("folded_tags", Text, nullable=True),
 )
 JOBS = Table(
     "jobs",

@@ -1,4 +1,6 @@
 /** Motion list of the library, and its display in the library panel and the header. */
+import type { MotionQuery } from "../client/api";
+import type { MotionLabels } from "../client/motion-library";
 import type { MotionItem } from "../ui/library/motion-item";
 import { MotionList } from "../ui/library/motion-list";
 import type { Page } from "../ui/page";
@@ -59,8 +61,21 @@ export class LibraryController {
     this.render();
   }
 
+  /** Show the motions of a query. Rejects with ProblemError. */
+  async search(query: MotionQuery): Promise<void> {
+    await this.motions.search(query);
+    this.render();
+  }
+
+  /** Change the name or tags of a motion. Rejects with ProblemError. */
+  async label(id: string, labels: MotionLabels): Promise<void> {
+    await this.motions.label(id, labels);
+    this.render();
+  }
+
   render(): void {
-    this.page.library.renderMotions(this.motions.items, this.#currentMotion);
+    const { items, found, tags } = this.motions;
+    this.page.library.renderMotions(found ?? items, this.#currentMotion, { tags, isFiltered: found !== null });
     this.page.header.setMotionName(this.currentItem?.name ?? "");
   }
 }

@@ -7,6 +7,7 @@ import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
+import type { EditActions } from "../ui/library/motion-editor";
 import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem } from "../ui/library/problem-report";
 import type { Page, UserActions } from "../ui/page";
@@ -18,6 +19,7 @@ import type { Exporter } from "./exporter";
 import { findFileKind } from "./file-kind";
 import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
+import { createEditedMotion } from "./motion-edit";
 import type { PlaybackController } from "./playback-controller";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
@@ -69,6 +71,8 @@ export function createUserActions(app: AppParts): UserActions {
       if (!confirm(translate('Remove "{name}" from the library?', { name: motion.name }))) return;
       app.library.remove(motion.id).catch((error: unknown) => showProblem(app.page.library, motion.name, error));
     },
+    search: (query) =>
+      app.library.search(query).catch((error: unknown) => showProblem(app.page.library, translate("Library"), error)),
     toggle: (limb) => app.limbs.act("toggle", limb),
     ask: (limb) => app.limbs.act("ask", limb),
     withdraw: (limb) => app.limbs.act("withdraw", limb),
@@ -89,7 +93,11 @@ export function createUserActions(app: AppParts): UserActions {
     labels: (metrics) => app.stageHost.setLabels(metrics),
     mappingShown: () => app.stageHost.pollGamepad(),
     ...(pageAccess.allows("ingest")
-      ? { keep: createPageRecordAction(app), captureTarget: () => captureTarget(app.playback.current) }
+      ? {
+          keep: createPageRecordAction(app),
+          captureTarget: () => captureTarget(app.playback.current),
+          edits: createEditActions(app),
+        }
       : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
@@ -148,6 +156,23 @@ function uploadTarget({ page, library, playback }: AppParts): UploadTarget {
     refresh: () => library.refresh().catch(() => undefined),
     refreshLater: () => library.refreshRepeatedly(),
     play: (id, keepsLibrary) => playback.playUploadedMotion(id, keepsLibrary),
+  };
+}
+
+/** Return the actions of the editor of a motion. */
+function createEditActions(app: AppParts): EditActions {
+  return {
+    label: (motion, labels) =>
+      app.library.label(motion.id, labels).then(
+        () => true,
+        (error: unknown) => {
+          showProblem(app.page.library, motion.name, error);
+          return false;
+        },
+      ),
+    edit: (motion, edit) =>
+      createEditedMotion(motion, edit, app.page.library, (made) => app.playback.playUploadedMotion(made.id)),
+    position: ({ id }) => (app.library.currentItem?.id === id ? (app.playback.current?.position ?? null) : null),
   };
 }
 

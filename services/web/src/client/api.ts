@@ -17,6 +17,7 @@ export interface Motion {
   tracks?: string[];
   /** Number of performers, by default one. */
   performers?: number;
+  tags?: string[];
   /** Names of the performers' motions, if there are several. */
   pieces?: string[];
   /** For a recording of a session: description of its origin, and id of the motion that was performed. */
@@ -73,9 +74,17 @@ export interface Page<T> {
   next: string | null;
 }
 
-/** List motions, newest first. */
-export function listMotions(cursor?: string): Promise<Page<Motion>> {
-  return requestJson("GET", `/v1/motions${cursorQuery(cursor)}`) as Promise<Page<Motion>>;
+/** Condition on listed motions; an empty text is none. Case is ignored. */
+export interface MotionQuery {
+  /** Every word of it occurs in the name. */
+  readonly search: string;
+  /** One of the tags. */
+  readonly tag: string;
+}
+
+/** List motions, newest first, all or those of a query. */
+export function listMotions(cursor?: string, { search, tag }: Partial<MotionQuery> = {}): Promise<Page<Motion>> {
+  return requestJson("GET", `/v1/motions${queryOf({ cursor, search, tag })}`) as Promise<Page<Motion>>;
 }
 
 /** Delete a motion. */
@@ -100,7 +109,7 @@ export function createSession(motion: string): Promise<Session> {
 
 /** List sessions. */
 export function listSessions(cursor?: string, access = pageAccess): Promise<Page<Session>> {
-  return requestJson("GET", `/v1/sessions${cursorQuery(cursor)}`, undefined, access) as Promise<Page<Session>>;
+  return requestJson("GET", `/v1/sessions${queryOf({ cursor })}`, undefined, access) as Promise<Page<Session>>;
 }
 
 /** Get a session. */
@@ -275,7 +284,7 @@ function translateReasons({ skipped, ...stored }: StoredTakes): StoredTakes {
 }
 
 /** Report the progress of an upload on the server until `ended`. Errors are ignored: the upload reports its own. */
-async function pollProgress(
+export async function pollProgress(
   uploadId: string,
   onProgress: (progress: UploadProgress) => void,
   ended: AbortSignal,
@@ -292,22 +301,29 @@ async function pollProgress(
 }
 
 /** Return 32 random hexadecimal digits. `crypto.randomUUID` does not exist on pages without TLS. */
-function createUploadId(): string {
+export function createUploadId(): string {
   return Array.from(crypto.getRandomValues(new Uint8Array(16)), (byte) => byte.toString(16).padStart(2, "0")).join("");
 }
 
-function cursorQuery(cursor: string | undefined): string {
-  return cursor === undefined ? "" : `?cursor=${encodeURIComponent(cursor)}`;
+/** Return the query of a URL with these parameters, without the empty ones. */
+function queryOf(parameters: Record<string, string | undefined>): string {
+  const pairs = Object.entries(parameters).flatMap(([name, value]) =>
+    value ? `${name}=${encodeURIComponent(value)}` : [],
+  );
+  return pairs.length > 0 ? `?${pairs.join("&")}` : "";
 }
 
-async function requestJson(
+/** Send a request with a JSON body, if any, and return the JSON of the response. Rejects with ProblemError. */
+export async function requestJson(
   method: string,
   path: string,
   body?: unknown,
   access: Access = pageAccess,
+  signal?: AbortSignal,
 ): Promise<unknown> {
   const content =
     body === undefined ? {} : { headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
-  const text = await (await access.request(access.server + path, { method, ...content })).text();
+  const options = { method, ...content, ...(signal ? { signal } : {}) };
+  const text = await (await access.request(access.server + path, options)).text();
   return text === "" ? null : JSON.parse(text);
 }

@@ -1,10 +1,12 @@
 /** User interface of the page around the stage: header, panels, transport, name tags and messages. */
+import type { MotionQuery } from "../client/api";
 import { translate } from "../i18n/translator";
 import type { Mapping } from "../input/mapping";
 import { createHeader, type Header } from "./header";
 import type { AvatarActions } from "./library/avatar-chooser";
 import type { RequestDownload } from "./library/download-menu";
 import { acceptDrops, createLibraryPanel, type LibraryPanel } from "./library/library-panel";
+import type { EditActions } from "./library/motion-editor";
 import type { MotionItem } from "./library/motion-item";
 import type { CaptureTarget } from "./library/performer-guide";
 import { createLinkPanel, type LinkPanel } from "./link/link-panel";
@@ -43,8 +45,12 @@ export interface UserActions extends StringsActions, SoundActions, AvatarActions
   remove(motion: MotionItem): void;
   /** Add the motion's performers to those on the stage. Omitted if this page may not. */
   add?(motion: MotionItem): void;
+  /** Show the motions of a query in the library. */
+  search(query: MotionQuery): Promise<void>;
   /** Return where a capture tool performs. Omitted if this page may not perform. */
   captureTarget?(): CaptureTarget;
+  /** Change motions of the library. Omitted if this page may not. */
+  edits?: EditActions;
   mapping(mapping: Mapping): void;
   /** Called when a panel opened, closed or changed its size: the stage may need another framing. */
   reframe(): void;

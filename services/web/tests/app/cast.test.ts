@@ -4,7 +4,7 @@ import type { RemotePlayback } from "../../src/app/remote-playback";
 import type { MotionItem } from "../../src/ui/library/motion-item";
 import { MotionList } from "../../src/ui/library/motion-list";
 
-const ITEM: MotionItem = { id: "b", name: "Bow", detail: "", seconds: 3, performers: 1 };
+const ITEM: MotionItem = { id: "b", name: "Bow", detail: "", seconds: 3, performers: 1, tags: [] };
 
 let requests: [string, unknown][];
 let edits: unknown[];

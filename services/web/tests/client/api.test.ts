@@ -25,6 +25,16 @@ test("lists are requested page by page", async () => {
   expect(requests.map(([path]) => path)).toEqual(["/v1/motions", "/v1/motions?cursor=b%2Fc", "/v1/sessions"]);
 });
 
+test("list is limited to words of the name and a tag", async () => {
+  const requests = stubResponse(200, '{"items": [], "next": null}');
+  await api.listMotions(undefined, { search: "鷺 & fan", tag: "" });
+  await api.listMotions("c", { search: "", tag: "slow" });
+  expect(requests.map(([path]) => path)).toEqual([
+    "/v1/motions?search=%E9%B7%BA%20%26%20fan",
+    "/v1/motions?cursor=c&tag=slow",
+  ]);
+});
+
 /** Answer requests, given as "METHOD path", with these JSON values; return the list of requests. */
 function stubResponses(responses: Record<string, unknown>): string[] {
   const requests: string[] = [];

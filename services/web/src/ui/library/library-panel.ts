@@ -2,6 +2,7 @@
  * Library panel: drop zone, progress of uploads and downloads, errors, list of motions, avatar section, and the guide
  * for live performers.
  */
+import type { MotionQuery } from "../../client/api";
 import { translate, translateToParts } from "../../i18n/translator";
 import { element, setAttribute } from "../dom";
 import { formatDuration } from "../format";
@@ -9,6 +10,8 @@ import { type IconName, icon, motionGlyph } from "../icon";
 import { createPanel, type Panel } from "../panel";
 import { type AvatarActions, type AvatarChooser, createAvatarChooser } from "./avatar-chooser";
 import { createDownloadMenu, type DownloadMenu, type RequestDownload } from "./download-menu";
+import type { LibraryFilter, LibraryTools, MotionRow } from "./library-tools";
+import type { EditActions } from "./motion-editor";
 import type { MotionItem } from "./motion-item";
 import type { CaptureTarget } from "./performer-guide";
 import { createProgressRow, removeItem } from "./progress-row";
@@ -16,7 +19,7 @@ import { createProgressRow, removeItem } from "./progress-row";
 /** Problems that are shown at the same time. Older ones are removed. */
 const MAX_PROBLEMS = 20;
 
-export interface DownloadRow {
+export interface TransferRow {
   /** Show the current step, and the fraction of the whole. */
   showProgress(text: string, fraction: number): void;
   remove(): void;
@@ -25,13 +28,15 @@ export interface DownloadRow {
 export interface LibraryPanel {
   readonly panel: Panel;
   readonly danceAs: AvatarChooser;
-  /** Load the guide for live performers, unless it was loaded before. Call this when the panel opens. */
+  /** Load search, pictures, editors and the guide, unless they were loaded before. Call this when the panel opens. */
   load(): void;
-  renderMotions(motions: readonly MotionItem[], current: string | null): void;
+  renderMotions(motions: readonly MotionItem[], current: string | null, filter: LibraryFilter): void;
   /** Place of the uploads, and the button before it. */
   readonly uploads: HTMLElement;
   readonly drop: HTMLElement;
-  addDownload(name: string, cancel: () => void): DownloadRow;
+  /** Add the progress of a motion that the server makes. */
+  addUpload(name: string, cancel: () => void): TransferRow;
+  addDownload(name: string, cancel: () => void): TransferRow;
   /** Open the download menu of a motion. */
   showDownloads(id: string): void;
   /** Show an error about the file or motion `name`, in place of an earlier one about it. */
@@ -46,6 +51,10 @@ export interface LibraryActions extends AvatarActions {
   /** Add the motion's performers to those on the stage. Omitted if this page may not. */
   add?(motion: MotionItem): void;
   download(motion: MotionItem, ...request: Parameters<RequestDownload>): void;
+  /** Show the motions of a query. */
+  search(query: MotionQuery): void;
+  /** Change motions. Omitted if this page may not. */
+  edits?: EditActions;
   /** Return where a capture tool performs. Omitted if this page may not perform. */
   captureTarget?(): CaptureTarget;
   close(): void;
@@ -86,12 +95,57 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
   panel.body.append(drop, picker, transfers, alert, list, empty, danceAs.element);
   const { captureTarget } = actions;
   let isGuideRequested = captureTarget === undefined;
+  let areToolsRequested = false;
+  let tools: LibraryTools | null = null;
+  let shown: Parameters<LibraryPanel["renderMotions"]> = [[], null, { tags: [], isFiltered: false }];
+
+  const renderMotions: LibraryPanel["renderMotions"] = (motions, current, filter) => {
+    shown = [motions, current, filter];
+    empty.hidden = motions.length > 0 || filter.isFiltered;
+    menus.clear();
+    const focused = document.activeElement;
+    list.replaceChildren(
+      ...motions.map((motion) => {
+        const menu = createDownloadMenu(
+          motion,
+          motion.id === openMenu,
+          (open) => (openMenu = open ? motion.id : null),
+          (...request) => actions.download(motion, ...request),
+        );
+        menus.set(motion.id, menu);
+        const row = createMotionRow(motion, current, menu, actions);
+        tools?.extend(row, motion);
+        return row.item;
+      }),
+    );
+    tools?.render(motions.length, filter);
+    // An open editor keeps the focus.
+    if (focused instanceof HTMLElement && list.contains(focused)) focused.focus({ preventScroll: true });
+  };
+  const loadTools = () => {
+    if (areToolsRequested) return;
+    areToolsRequested = true;
+    import("./library-tools").then(
+      ({ createLibraryTools }) => {
+        tools = createLibraryTools(actions);
+        list.before(tools.search);
+        renderMotions(...shown);
+      },
+      // the next opening tries again
+      () => (areToolsRequested = false),
+    );
+  };
+  const addTransfer = (kind: "upload" | "download", name: string, cancel: () => void): TransferRow => {
+    const { show, remove } = createProgressRow(transfers, kind, name, cancel);
+    return { showProgress: (text, fraction) => show(fraction, text), remove: () => remove(drop) };
+  };
   return {
     panel,
     danceAs,
     uploads,
     drop,
     load() {
+      loadTools();
       if (isGuideRequested) return;
       isGuideRequested = true;
       import("./performer-guide").then(
@@ -100,26 +154,9 @@ export function createLibraryPanel(root: HTMLElement, actions: LibraryActions): 
         () => (isGuideRequested = false),
       );
     },
-    renderMotions(motions, current) {
-      empty.hidden = motions.length > 0;
-      menus.clear();
-      list.replaceChildren(
-        ...motions.map((motion) => {
-          const menu = createDownloadMenu(
-            motion,
-            motion.id === openMenu,
-            (open) => (openMenu = open ? motion.id : null),
-            (...request) => actions.download(motion, ...request),
-          );
-          menus.set(motion.id, menu);
-          return createMotionRow(motion, current, menu, actions);
-        }),
-      );
-    },
-    addDownload(name, cancel) {
-      const { show, remove } = createProgressRow(transfers, "download", name, cancel);
-      return { showProgress: (text, fraction) => show(fraction, text), remove: () => remove(drop) };
-    },
+    renderMotions,
+    addUpload: (name, cancel) => addTransfer("upload", name, cancel),
+    addDownload: (name, cancel) => addTransfer("download", name, cancel),
     showDownloads: (id) => menus.get(id)?.open(),
     problem(name, title, detail, hint) {
       const box = element(
@@ -157,7 +194,7 @@ function createMotionRow(
   current: string | null,
   menu: DownloadMenu,
   actions: LibraryActions,
-): HTMLElement {
+): MotionRow {
   const choose = element("button", { class: "motion", type: "button", onClick: () => actions.choose(motion.id) });
   setAttribute(choose, "aria-current", motion.id === current ? "true" : null);
   const glyph = element("span", { class: "motion-glyph" });
@@ -168,6 +205,8 @@ function createMotionRow(
     element("b", { dir: "auto" }, motion.name),
     element("small", {}, motion.detail),
   );
+  if (motion.tags.length > 0)
+    text.append(element("small", { class: "motion-tags", dir: "auto" }, motion.tags.join(" \u00b7 ")));
   choose.append(glyph, text, element("span", { class: "motion-length" }, formatDuration(motion.seconds)));
   const { name } = motion;
   const remove = createToolButton("bin", "motion-remove", translate("Remove {name}", { name }), () =>
@@ -180,7 +219,7 @@ function createMotionRow(
         actions.add?.(motion),
       ),
     );
-  return element("li", {}, choose, tools, menu.choices);
+  return { item: element("li", {}, choose, tools, menu.choices), glyph, tools };
 }
 
 function createToolButton(iconName: IconName, kind: string, name: string, onClick: () => void): HTMLElement {

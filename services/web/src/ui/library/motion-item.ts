@@ -7,4 +7,5 @@ export interface MotionItem {
   seconds: number;
   /** Number of performers in the motion. */
   performers: number;
+  tags: readonly string[];
 }
