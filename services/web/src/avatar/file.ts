@@ -78,11 +78,11 @@ function noBody(json: GltfJson): AvatarError {
   return new AvatarError(
     translate("No usable humanoid"),
     quoted.length > 0
-      ? translate("no body found in {meshes} meshes and {joints} joints ({names})", {
+      ? translate("no body found; meshes: {meshes}, joints: {joints} ({names})", {
           ...counts,
           names: joinList(quoted),
         })
-      : translate("no body found in {meshes} meshes and {joints} joints", counts),
+      : translate("no body found; meshes: {meshes}, joints: {joints}", counts),
     bonesHint(),
   );
 }

@@ -148,9 +148,8 @@ export const JAPANESE_PAGE_MESSAGES = {
     "1つのバイナリglTFファイル（.glbか.vrm）として書き出してください。",
   "Not a single file": "1つのファイルにまとまっていません",
   "it refers to the external file {address}": "「{address}」を参照しています",
-  "no body found in {meshes} meshes and {joints} joints":
-    "人の体が見つかりません（メッシュ{meshes}、ジョイント{joints}）",
-  "no body found in {meshes} meshes and {joints} joints ({names})":
+  "no body found; meshes: {meshes}, joints: {joints}": "人の体が見つかりません（メッシュ{meshes}、ジョイント{joints}）",
+  "no body found; meshes: {meshes}, joints: {joints} ({names})":
     "人の体が見つかりません（メッシュ{meshes}、ジョイント{joints}：{names}）",
   "missing bones: {bones}": "見つからないボーン：{bones}",
   "No usable humanoid": "踊れる人型ではありません",

@@ -119,7 +119,7 @@ describe("unusable files", () => {
     (...names) => {
       const { title, detail, hint } = errorOf(glb(createThings(...names)));
       expect(title).toBe("No usable humanoid");
-      expect(detail).toContain("no body found in 1 meshes and 0 joints");
+      expect(detail).toContain("no body found; meshes: 1, joints: 0");
       expect(detail).toContain(names[0]);
       expect(hint).toContain("two arms, two legs and a head");
     },

@@ -3,7 +3,9 @@ import { mkdtempSync, readdirSync, readFileSync, rmSync, writeFileSync } from "n
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { expect, onTestFinished, test } from "vitest";
+import { compressByMeshopt, withTexture } from "../avatar/compressed-files";
 import { createFigureFile } from "../avatar/figure-files";
+import { ETC1S_TEXTURE } from "../avatar/textures";
 import { createBowingBvh } from "../browser/bvh-file";
 import { type BrowserWindow, type PointerType, WAIT_TIMEOUT_MS } from "./browser";
 import { connectGamepad, moveStick } from "./gamepad";
@@ -294,8 +296,10 @@ export function defineSlowCases(fixture: WebDriverFixture): void {
   });
 }
 
-/** A small avatar file. */
-const AVATAR_BASE64 = Buffer.from(createFigureFile({ vrm: 1 })).toString("base64");
+/** A small avatar file, whose mesh and texture every browser has to decode. */
+const AVATAR_BASE64 = Buffer.from(
+  await compressByMeshopt(withTexture(createFigureFile({ vrm: 1, dressed: true }), ETC1S_TEXTURE)),
+).toString("base64");
 
 function poll<T>(message: string, read: () => T | Promise<T>) {
   return expect.poll(read, { timeout: WAIT_TIMEOUT_MS, interval: POLL_INTERVAL_MS, message });

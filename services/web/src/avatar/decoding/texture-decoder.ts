@@ -63,7 +63,8 @@ export class TextureDecoder extends KTX2Loader {
 
 /** Return a context that tells the formats of compressed textures. */
 function openContext(): WebGL2RenderingContext {
-  const canvas = typeof OffscreenCanvas === "undefined" ? document.createElement("canvas") : new OffscreenCanvas(1, 1);
+  // Some browsers have WebGL for canvas elements alone.
+  const canvas = typeof document === "undefined" ? new OffscreenCanvas(1, 1) : document.createElement("canvas");
   const context = canvas.getContext("webgl2") as WebGL2RenderingContext | null;
   if (!context)
     throw new AvatarError(
