@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bunraku.motion.naming_profile import LIMB_JOINT_NAMES
+from bunraku.motion.naming.naming_profile import LIMB_JOINT_NAMES
 
 LIMBS = [f"{side}_{joint}" for side in "lr" for joint in LIMB_JOINT_NAMES]
 """The order of the expected names below: left leg, left arm, right leg, right arm."""

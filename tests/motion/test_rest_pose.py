@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.motion import rotation
-from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
+from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.readers import bvh
 from bunraku.motion.rest_pose import METRES_PER_UNIT, RestPose, find_rest_pose, resolve_sides, sample_frames
 from bunraku.motion.rotation import Array

@@ -13,10 +13,10 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion
-from bunraku.motion.name_mapping import map_by_name
+from bunraku.motion.naming.name_mapping import map_by_name
+from bunraku.motion.naming.shape_mapping import map_by_shape
 from bunraku.motion.rest_pose import resolve_sides
 from bunraku.motion.rotation import Array
-from bunraku.motion.shape_mapping import map_by_shape
 from bunraku.motion.skeleton import JOINTS, PARENTS, standard_figure
 from bunraku.motion.source_motion import SampledMotion
 from tests.motion.naming_samples import BODIES, build_body, build_tree

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, SIDE_WORDS
+from bunraku.motion.naming.naming_profile import LIMB_JOINT_NAMES, PROFILES, SIDE_WORDS
 
 
 def make_document() -> dict[str, Any]:

@@ -13,11 +13,11 @@ from bunraku.motion.extension_fit import ExtensionMotion, extended_pose, fit_bod
 from bunraku.motion.fit import FigureFit
 from bunraku.motion.joint_tree import common_ancestor
 from bunraku.motion.limb_fit import fit_arm, fit_leg
-from bunraku.motion.name_mapping import SHAPE_PROFILE, find_head_by_name, map_by_name
+from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, find_head_by_name, map_by_name
+from bunraku.motion.naming.shape_mapping import find_head, map_by_shape
 from bunraku.motion.placement import MAX_STAGE_DISTANCE_M
 from bunraku.motion.rest_pose import RestPose, find_rest_pose, resolve_sides, sample_frames
 from bunraku.motion.rotation import Array
-from bunraku.motion.shape_mapping import find_head, map_by_shape
 from bunraku.motion.skeleton import (
     JOINT_COUNT,
     JOINTS,

@@ -13,7 +13,7 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion
-from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
+from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import SourceMotion
 

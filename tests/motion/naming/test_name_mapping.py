@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.motion.joint_name import split_words
-from bunraku.motion.name_mapping import JointMapping, find_head_by_name, map_by_name
-from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
+from bunraku.motion.naming.joint_name import split_words
+from bunraku.motion.naming.name_mapping import JointMapping, find_head_by_name, map_by_name
+from bunraku.motion.naming.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
 from bunraku.motion.readers.bvh_hierarchy import parse_hierarchy
 from tests.motion.naming_samples import BODIES, LIMBS, build_tree, expected_names
 

@@ -8,9 +8,9 @@ import pytest
 
 from bunraku.motion.analysis import analyse
 from bunraku.motion.errors import UnreadableMotion
-from bunraku.motion.name_mapping import map_by_name
+from bunraku.motion.naming.name_mapping import map_by_name
+from bunraku.motion.naming.shape_mapping import find_head, map_by_shape
 from bunraku.motion.readers import bvh
-from bunraku.motion.shape_mapping import find_head, map_by_shape
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS
 from tests.motion.synthetic_motion import export_bvh, pose_with_arms, smooth_motion
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 
 from bunraku.motion.joint_tree import is_descendant
-from bunraku.motion.naming_profile import SIDE_WORDS, NamingProfile
+from bunraku.motion.naming.naming_profile import SIDE_WORDS, NamingProfile
 
 
 def normalise_name(name: str) -> str:

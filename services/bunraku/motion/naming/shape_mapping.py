@@ -14,7 +14,7 @@ import numpy as np
 
 from bunraku.motion.errors import UnreadableMotion
 from bunraku.motion.joint_tree import ancestor_chain, common_ancestor, is_descendant
-from bunraku.motion.name_mapping import SHAPE_PROFILE, JointMapping
+from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import SourceMotion, bone_lengths
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from bunraku.motion.joint_name import NameIndex, Spelling, find_spellings, split_words, strip_numbers
 from bunraku.motion.joint_tree import ancestor_chain
-from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
+from bunraku.motion.naming.joint_name import NameIndex, Spelling, find_spellings, split_words, strip_numbers
+from bunraku.motion.naming.naming_profile import LIMB_JOINT_NAMES, PROFILES, NamingProfile
 
 REQUIRED_LIMB_JOINTS = ("hip", "knee", "shoulder", "elbow")
 """Limb joints that a profile must match on both sides."""

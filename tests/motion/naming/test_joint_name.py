@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bunraku.motion.joint_name import NameIndex, find_spellings, normalise_name, split_words, strip_numbers
-from bunraku.motion.naming_profile import PROFILES
+from bunraku.motion.naming.joint_name import NameIndex, find_spellings, normalise_name, split_words, strip_numbers
+from bunraku.motion.naming.naming_profile import PROFILES
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,8 @@ import re
 
 import pytest
 
-from bunraku.motion.joint_name import normalise_name
-from bunraku.motion.naming_profile import LIMB_JOINT_NAMES, PROFILES, SIDE_WORDS, NamingProfile
+from bunraku.motion.naming.joint_name import normalise_name
+from bunraku.motion.naming.naming_profile import LIMB_JOINT_NAMES, PROFILES, SIDE_WORDS, NamingProfile
 from bunraku.motion.skeleton import JOINTS
 
 NAMED: tuple[str, ...] = (
