@@ -1,6 +1,6 @@
 /** Build of the npm package for custom pages: `npm run build:package` writes it to `dist`, ready for `npm pack`. */
-import { readdirSync, readFileSync } from "node:fs";
-import { join } from "node:path";
+import { readFileSync } from "node:fs";
+import { dirname, join } from "node:path";
 import { defineConfig, type Plugin } from "vite";
 import own from "./package.json" with { type: "json" };
 
@@ -30,19 +30,31 @@ const manifest = {
   peerDependenciesMeta: { "@types/three": { optional: true } },
 };
 
+const RELATIVE_IMPORT = /(from |import\()"(\.{1,2}\/[^"]+)"/g;
+
 /** Add file extensions to relative imports, so that every module resolution finds the declarations. */
 function addExtensions(declaration: string): string {
-  return declaration.replace(/(from |import\()"(\.{1,2}\/[^"]+)"/g, '$1"$2.js"');
+  return declaration.replace(RELATIVE_IMPORT, '$1"$2.js"');
+}
+
+/** Return the declarations that those of the entries import, at any depth, by their path. */
+function reachableDeclarations(): Map<string, string> {
+  const found = new Map<string, string>();
+  const open = Object.values(ENTRIES).map((entry) => entry.replace(/^src\/(.*)\.ts$/, "$1.d.ts"));
+  for (let file = open.pop(); file !== undefined; file = open.pop()) {
+    if (found.has(file)) continue;
+    const declaration = readFileSync(join(DECLARATIONS, file), "utf8");
+    found.set(file, declaration);
+    for (const [, , path] of declaration.matchAll(RELATIVE_IMPORT)) open.push(join(dirname(file), `${path}.d.ts`));
+  }
+  return found;
 }
 
 const pack: Plugin = {
   name: "package",
   generateBundle() {
     const emit = (fileName: string, source: string) => this.emitFile({ type: "asset", fileName, source });
-    for (const file of readdirSync(DECLARATIONS, { recursive: true, encoding: "utf8" })) {
-      if (file.endsWith(".d.ts"))
-        emit(join("types", file), addExtensions(readFileSync(join(DECLARATIONS, file), "utf8")));
-    }
+    for (const [file, declaration] of reachableDeclarations()) emit(join("types", file), addExtensions(declaration));
     emit("package.json", `${JSON.stringify(manifest, null, 2)}\n`);
     emit("README.md", readFileSync("PACKAGE.md", "utf8"));
     for (const name of ["LICENSE", "NOTICE"]) emit(name, readFileSync(join("../..", name), "utf8"));

@@ -468,10 +468,10 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Left stick {way}": "左スティック{way}",
   "Right stick {way}": "右スティック{way}",
   "Axis {number} {sign}": "軸{number} {sign}",
-} as const;
+};
 
 /** Japanese translations of frequent texts from the server. A value in such a text may itself have a translation. */
-export const JAPANESE_SERVER_MESSAGES = {
+export const JAPANESE_SERVER_MESSAGES: Readonly<Record<string, string>> = {
   "Not a BVH file": "BVHファイルではありません",
   "it begins with {word}": "先頭が{word}になっています",
   "a BVH file begins with the word HIERARCHY; export the motion as BVH":
@@ -515,4 +515,4 @@ export const JAPANESE_SERVER_MESSAGES = {
   "right hand": "右手",
   "left leg": "左足",
   "right leg": "右足",
-} as const;
+};

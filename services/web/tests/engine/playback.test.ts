@@ -30,7 +30,7 @@ test("session of another server is found, opened and edited there", async () => 
   const urls = () => FakeWebSocket.opened.map(({ url }) => url);
   const playback = new Playback("on", "Aiko", () => undefined, { access });
   expect(urls()).toEqual([
-    "wss://stage.example/v1/sessions/on/stream",
+    "wss://stage.example/v1/sessions/on/stream?extensions=true",
     "wss://stage.example/v1/sessions/on/control?name=Aiko",
   ]);
   playback.edit({ playing: false });
@@ -38,7 +38,7 @@ test("session of another server is found, opened and edited there", async () => 
   playback.close();
   FakeWebSocket.opened.length = 0;
   const viewOnly = new Playback("on", "Aiko", () => undefined, { access, viewOnly: true });
-  expect(urls()).toEqual(["wss://stage.example/v1/sessions/on/stream"]);
+  expect(urls()).toEqual(["wss://stage.example/v1/sessions/on/stream?extensions=true"]);
   viewOnly.close();
   FakeWebSocket.remove();
 });
