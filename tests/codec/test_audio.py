@@ -8,10 +8,12 @@ from hypothesis import strategies as st
 
 from bunraku.codec.audio import (
     AUDIO_CODEC,
+    MAX_PRE_SKIP_SAMPLES,
     PACKET_SAMPLES,
     SAMPLE_RATE,
     EncodedAudio,
     create_audio_track,
+    cut_audio,
     max_samples,
     pack_audio_block,
     pack_audio_level,
@@ -118,3 +120,26 @@ def test_invalid_description_is_refused(change: dict[str, Any], message: str) ->
     described = EncodedAudio(track, [pack_audio_level(track, random_packets(track.packet_count, 90, 2))]).describe()
     with pytest.raises(DamagedBlock, match=message):
         parse_audio_track(described | change, TIMING)
+
+
+@given(st.integers(1, 400_000), st.integers(0, PACKET_SAMPLES), st.data())
+def test_cut_sound_begins_at_the_exact_sample(samples: int, pre_skip: int, data: st.DataObject) -> None:
+    whole = create_audio_track(Timing(30.0, 300, 30, 15), 2, pre_skip, samples)
+    # every packet tells its number
+    packets = [PACKET_PREFIXES[0] + number.to_bytes(2) for number in range(whole.packet_count)]
+    level = pack_audio_level(whole, packets)
+    first_sample, frames = data.draw(st.integers(0, samples + 1_000)), data.draw(st.integers(1, 90))
+    cut = cut_audio(whole, [level.blocks, level.blocks], Timing(30.0, frames, 30, min(15, frames)), first_sample)
+    if first_sample >= samples:
+        assert cut is None
+        return
+    assert cut is not None
+    track = cut.track
+    assert track.samples == min(samples - first_sample, 1_600 * frames)
+    assert track.pre_skip <= MAX_PRE_SKIP_SAMPLES
+    kept = [packet for block in cut.ladder[1].blocks for packet in unpack_audio_block(block)]
+    assert [packet.number for packet in kept] == list(range(track.packet_count))
+    first_packet = int.from_bytes(kept[0].data[-2:])
+    assert whole.first_sample(first_packet) + track.pre_skip == first_sample
+    # the decoder has a packet to converge in, unless the sound begins here
+    assert first_packet == 0 or track.pre_skip >= PACKET_SAMPLES

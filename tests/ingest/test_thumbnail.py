@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import asyncio
 import base64
+import dataclasses
 import hashlib
 import re
 from pathlib import Path
@@ -88,6 +89,51 @@ async def test_picture_is_drawn_once_for_concurrent_requests(tmp_path: Path, mon
         thumbnails = await open_thumbnails(context, MOTIONS["one"])
         pictures = await asyncio.gather(*(thumbnails.get("one", make_request()) for _ in range(8)))
         assert len(set(pictures)) == len(drawn) == 1
+
+
+async def test_wanted_pictures_are_drawn_together(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    batches: list[int] = []
+
+    async def count_run(function: Any, arguments: Any, *options: Any) -> Any:
+        batches.append(len(arguments[0]))
+        return await run_in_worker(function, arguments, *options)
+
+    monkeypatch.setattr(thumbnail, "run_in_worker", count_run)
+    async with open_context(Settings(data=tmp_path)) as context:
+        for stored in MOTIONS.values():
+            thumbnails = await open_thumbnails(context, stored)
+        # one that is not there does not keep the others waiting
+        names = [*MOTIONS, "lost"]
+        await context.catalogue.add_motion(CatalogueEntry("lost", 5, {}))
+        pictures = await asyncio.gather(
+            *(thumbnails.get(name, make_request()) for name in names), return_exceptions=True
+        )
+        assert [isinstance(picture, bytes) for picture in pictures] == [True] * len(MOTIONS) + [False]
+        assert pictures[0] != pictures[1]
+        # the first begins at once, the rest waits for it
+        assert batches == [1, len(MOTIONS) - 1]
+        # the same as when it is drawn alone
+        alone = Thumbnails(context)
+        assert await alone.get("one", make_request()) == pictures[0]
+
+
+async def test_damaged_motion_has_no_picture_but_others_have(tmp_path: Path) -> None:
+    async with open_context(Settings(data=tmp_path)) as context:
+        thumbnails = await open_thumbnails(context, MOTIONS["one"])
+        two = MOTIONS["two"]
+        (performer,) = two.performers
+        damaged = [[packet[:3] + b"\xff" * 400 for packet in level] for level in performer.packets]
+        broken = dataclasses.replace(two, id="broken", performers=(dataclasses.replace(performer, packets=damaged),))
+        await open_thumbnails(context, broken)
+        answers = await asyncio.gather(
+            *(thumbnails.get(name, make_request()) for name in ("broken", "one")), return_exceptions=True
+        )
+        assert isinstance(answers[1], bytes)
+        if isinstance(answers[0], ProblemError):
+            assert answers[0].status == 422
+        else:
+            # random bytes may decode to some pose
+            assert isinstance(answers[0], bytes)
 
 
 async def test_oldest_picture_leaves_the_full_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

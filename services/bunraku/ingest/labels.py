@@ -43,16 +43,23 @@ def _require_unique(tags: list[str]) -> list[str]:
     return tags
 
 
-Name = Annotated[str, Field(max_length=MAX_NAME_CHARACTERS), AfterValidator(clean_name)]
-Tag = Annotated[str, Field(max_length=MAX_TAG_CHARACTERS), AfterValidator(_clean_tag)]
+def _omit_default(schema: dict[str, Any]) -> None:
+    """Remove the default from the schema of a field: an absent one has no value."""
+    schema.pop("default", None)
+
+
+Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME_CHARACTERS), AfterValidator(clean_name)]
+Tag = Annotated[str, Field(min_length=1, max_length=MAX_TAG_CHARACTERS), AfterValidator(_clean_tag)]
 
 
 class Labels(BaseModel):
     """New name and tags of a motion; an absent one stays as it is."""
 
     model_config = ConfigDict(extra="forbid")
-    name: Name = ""
-    tags: Annotated[list[Tag], Field(max_length=MAX_TAGS), AfterValidator(_require_unique)] = []
+    name: Annotated[Name, Field(json_schema_extra=_omit_default)] = ""
+    tags: Annotated[
+        list[Tag], Field(max_length=MAX_TAGS, json_schema_extra=_omit_default), AfterValidator(_require_unique)
+    ] = []
 
     def apply(self, description: dict[str, Any]) -> dict[str, Any]:
         """Return the description of a motion with these labels; raise `ProblemError` (422) if there are none."""

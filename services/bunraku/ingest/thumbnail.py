@@ -1,6 +1,7 @@
 """Small pictures of motions: all performers in the middle of the motion, in SVG.
 
 A picture is drawn from one block of each performer, in a worker process, when it is first requested; then it is cached.
+Starting the process takes a hundred times as long as drawing, so one process draws all pictures that are wanted.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections import OrderedDict
 from starlette.requests import Request
 
 from bunraku.codec.container import PerformerTracks, StoredMotion
+from bunraku.codec.errors import DamagedBlock
 from bunraku.http.admission import AdmissionLimit, holder_of
 from bunraku.http.problem_details import motion_not_found
 from bunraku.motion.brush_drawing import STYLE
@@ -33,8 +35,10 @@ MAX_CACHED_THUMBNAILS = 1_000
 MAX_DRAWINGS = 64
 """Pictures that are being drawn or wait for it at the same time; further ones get 503."""
 MAX_DRAWINGS_PER_HOLDER = 16
+MAX_BATCH = 16
+"""Pictures that one worker process draws."""
 DRAWING_TIMEOUT_S = 20.0
-"""Time limit for one picture, which takes some milliseconds, in seconds."""
+"""Time limit for one worker process, in seconds."""
 
 worker_process.preload_modules("bunraku.ingest.jobs.thumbnail")
 
@@ -45,6 +49,8 @@ class Thumbnails:
     def __init__(self, context: ServiceContext) -> None:
         self._context = context
         self._cached: OrderedDict[str, bytes] = OrderedDict()
+        # ids of the motions whose pictures wait, in order
+        self._wanted: dict[str, None] = {}
         self._limit = AdmissionLimit("thumbnails", MAX_DRAWINGS, MAX_DRAWINGS_PER_HOLDER)
         # one at a time: the other processor is for the service
         self._drawing = asyncio.Semaphore(1)
@@ -61,24 +67,39 @@ class Thumbnails:
             if not self._context.kernels_compiled.is_set():
                 raise ProblemError(503, "Preparing", "this server is preparing its kernels", hint="try again later")
             with self._limit.admit(holder_of(request)):
+                self._wanted[motion_id] = None
                 async with self._drawing:
+                    # another request may have drawn it together with its own
                     if motion_id not in self._cached:
-                        self._store(motion_id, await self._draw(motion_id))
+                        await self._draw(motion_id)
         self._cached.move_to_end(motion_id)
         return self._cached[motion_id]
 
-    async def _draw(self, motion_id: str) -> bytes:
-        stored = await self._context.motion_store.get(motion_id)
-        if stored is None:
+    async def _draw(self, motion_id: str) -> None:
+        """Draw and cache a picture, and others that are wanted; raise `ProblemError` if this one cannot be drawn."""
+        self._wanted.pop(motion_id, None)
+        own = await self._context.motion_store.get(motion_id)
+        if own is None:
             raise motion_not_found(motion_id)
+        motions = {motion_id: middle_blocks(own)}
+        for other in list(self._wanted)[: MAX_BATCH - 1]:
+            del self._wanted[other]
+            stored = None if other in self._cached else await self._context.motion_store.get(other)
+            if stored is not None:
+                motions[other] = middle_blocks(stored)
         try:
-            return await run_in_worker(_call_draw, (middle_blocks(stored),), DRAWING_TIMEOUT_S)
+            pictures = await run_in_worker(_call_draw, (list(motions.values()),), DRAWING_TIMEOUT_S)
         except WorkerTimedOut as error:
-            # a picture takes milliseconds: the machine is busy
+            # pictures take milliseconds: the machine is busy
             raise ProblemError(503, "Busy", str(error), hint="try again in a few seconds") from None
         except WorkerFailed:
+            pictures = []
+        for each, picture in zip(motions, pictures, strict=False):
+            if picture:
+                self._store(each, picture)
+        if motion_id not in self._cached:
             detail = f"the picture of {motion_id} cannot be drawn; its object may be damaged"
-            raise ProblemError(422, "Unreadable motion", detail, hint="upload its file again") from None
+            raise ProblemError(422, "Unreadable motion", detail, hint="upload its file again")
 
     def _store(self, motion_id: str, picture: bytes) -> None:
         if len(self._cached) >= MAX_CACHED_THUMBNAILS:
@@ -105,8 +126,14 @@ def middle_blocks(stored: StoredMotion) -> list[MiddleBlock]:
     return blocks
 
 
-def _call_draw(blocks: list[MiddleBlock]) -> bytes:
-    """Draw a picture, in the worker process."""
+def _call_draw(motions: list[list[MiddleBlock]]) -> list[bytes]:
+    """Draw pictures, in the worker process; that of a damaged motion is empty."""
     from bunraku.ingest.jobs.thumbnail import draw_thumbnail
 
-    return draw_thumbnail(blocks)
+    pictures = []
+    for blocks in motions:
+        try:
+            pictures.append(draw_thumbnail(blocks))
+        except DamagedBlock:
+            pictures.append(b"")
+    return pictures

@@ -2,8 +2,8 @@
 import { fetchThumbnail } from "../../client/motion-library";
 import { element } from "../dom";
 
-/** Number of pictures that are fetched at the same time. */
-const MAX_CONCURRENT_REQUESTS = 3;
+/** Number of pictures that are fetched at the same time. The server draws them together. */
+const MAX_CONCURRENT_REQUESTS = 6;
 /** Number of pictures that are kept; each has about 3 kB. */
 const MAX_KEPT_PICTURES = 400;
 
