@@ -15,7 +15,7 @@ export interface PuppetModel {
   positions: Float32Array<ArrayBuffer>;
   normals: Float32Array<ArrayBuffer>;
   colours: Float32Array<ArrayBuffer>;
-  /** Per vertex: four bones, in the order of `MESH_BONES`, and their weights. */
+  /** Per vertex: four bones, (the figure's joints, its sleeves, then chest, neck and clavicles), and their weights. */
   bones: Uint8Array<ArrayBuffer>;
   weights: Float32Array<ArrayBuffer>;
   /** Per vertex: position on the face texture, from its upper left corner. */
@@ -32,8 +32,6 @@ export interface PuppetModel {
 
 const SHOULDERS = ["l_shoulder", "r_shoulder"] as const;
 const SLEEVES = ["l_sleeve", "r_sleeve"] as const;
-/** Bones of a puppet's mesh: the figure's joints, its sleeves, and those of the trunk that an extension moves. */
-const MESH_BONES: readonly string[] = [...JOINTS, ...SLEEVES, "chest", "neck", "l_clavicle", "r_clavicle"];
 const PBR_MATERIAL = { metallicFactor: 0, roughnessFactor: 0.6 };
 
 /** A motion and its puppet; a model used several times is written once. */
@@ -89,7 +87,7 @@ interface PuppetSkin {
   joints: number[];
   /** Positions [joint][3] in metres. */
   places: number[];
-  /** Joint of the skin for each of `MESH_BONES`. */
+  /** Joint of the skin for each bone of the mesh. */
   skinOf: number[];
 }
 
@@ -161,8 +159,9 @@ function addBones({ nodes }: GltfBuilder, { names, parents, offsets, count }: Ex
 }
 
 /**
- * Return the skin of a puppet's mesh. Limbs and head are bound where the mesh has them, which is where the figure does;
- * the trunk bends about the joints of the extension.
+ * Return the skin of a puppet's mesh. Limbs and head are bound where the mesh has them, which is where the figure does.
+ * A bone of the trunk, which an extension gives other lengths, carries one point of the mesh to its place: the neck the
+ * base of the head, a clavicle the shoulder, the chest the middle of the shoulders.
  */
 function createSkin(figure: Figure, skeleton: ExportSkeleton): PuppetSkin {
   const rest = skeleton.restPositions(),
@@ -170,29 +169,35 @@ function createSkin(figure: Figure, skeleton: ExportSkeleton): PuppetSkin {
   const vl5 = skeleton.indexOf("vl5");
   const bends = skeleton.names.length > JOINTS.length && skeleton.chest > 0;
   const chest = bends ? skeleton.chest : vl5;
-  const trunk = [NECK_NAME, ...CLAVICLE_NAMES].map((name) =>
-    skeleton.indexOf(name) < 0 ? chest : skeleton.indexOf(name),
-  );
+  const orChest = (name: string) => (skeleton.indexOf(name) < 0 ? chest : skeleton.indexOf(name));
+  const trunk = [
+    { joint: chest, carried: SHOULDERS },
+    { joint: orChest(NECK_NAME), carried: ["skullbase"] },
+    { joint: orChest(CLAVICLE_NAMES[0]), carried: [SHOULDERS[0]] },
+    { joint: orChest(CLAVICLE_NAMES[1]), carried: [SHOULDERS[1]] },
+  ];
   const skin: PuppetSkin = { joints: [], places: [], skinOf: [] };
-  MESH_BONES.forEach((name, bone) => {
-    const sleeve = SLEEVES.indexOf(name as (typeof SLEEVES)[number]);
-    const isJoint = bone < JOINTS.length;
-    const joint = isJoint
-      ? skeleton.indexOf(name)
-      : sleeve >= 0
-        ? skeleton.count + sleeve
-        : [chest, ...trunk][bone - JOINTS.length - SLEEVES.length];
+  const add = (joint: number, place: (axis: number) => number) => {
     const known = skin.joints.indexOf(joint);
     skin.skinOf.push(known < 0 ? skin.joints.push(joint) - 1 : known);
-    if (known >= 0) return;
-    const [places, at] =
-      sleeve >= 0
-        ? [figureRest, JOINTS.indexOf(SHOULDERS[sleeve])]
-        : isJoint && !(bends && name === "vl5")
-          ? [figureRest, bone]
-          : [rest, joint];
-    skin.places.push(...places.subarray(at * 3, at * 3 + 3));
+    if (known < 0) skin.places.push(place(0), place(1), place(2));
+  };
+  JOINTS.forEach((name, joint) => {
+    const own = skeleton.indexOf(name);
+    const isTrunk = bends && name === "vl5";
+    add(own, (axis) => (isTrunk ? rest[own * 3 + axis] : figureRest[joint * 3 + axis]));
   });
+  SLEEVES.forEach((_, sleeve) =>
+    add(skeleton.count + sleeve, (axis) => figureRest[JOINTS.indexOf(SHOULDERS[sleeve]) * 3 + axis]),
+  );
+  for (const { joint, carried } of trunk) {
+    add(joint, (axis) => {
+      const moved = carried.map(
+        (name) => figureRest[JOINTS.indexOf(name) * 3 + axis] - rest[skeleton.indexOf(name) * 3 + axis],
+      );
+      return rest[joint * 3 + axis] + moved.reduce((sum, value) => sum + value, 0) / moved.length;
+    });
+  }
   return skin;
 }
 
