@@ -17,6 +17,7 @@ from bunraku.motion.readers.takes import TakeList
 from bunraku.runtime import worker_process
 from bunraku.runtime.worker_message import send_message
 from tests.motion.readers.fbx_writer import write_fbx
+from tests.motion.readers.sources import write_zip
 from tests.servers import make_bvh_clip
 from tests.time_limit import HANG_TIMEOUT_S
 
@@ -103,3 +104,18 @@ async def test_takes_are_listed_in_another_process(tmp_path: Path) -> None:
     rejected = await job_process.list_takes(source, 1, HANG_TIMEOUT_S)
     assert isinstance(rejected, JobRejection)
     assert rejected.title == "Broken archive"
+
+
+def crash(_: Path, __: int) -> None:
+    os.kill(os.getpid(), signal.SIGSEGV)
+
+
+async def test_files_of_an_archive_that_crash_their_reader_are_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(job_process, "_call_list_takes", crash)
+    source = tmp_path / "source"
+    source.write_bytes(write_zip({"a.fbx": write_fbx(takes=("walk", "run")), "b.bvh": b"x"}))
+    assert await job_process.list_takes(source, 9, HANG_TIMEOUT_S) == TakeList(["a.fbx", "b.bvh"], 2)
+    source.write_bytes(write_fbx(takes=("walk", "run")))
+    assert await job_process.list_takes(source, 9, HANG_TIMEOUT_S) == TakeList([], 0)

@@ -11,7 +11,7 @@ from pydantic import SecretStr
 from bunraku.ingest.job_queue import JobQueue, JobQueueTiming, UploadJob
 from bunraku.ingest.motion import MotionOperation
 from bunraku.ingest.progress import UploadProgress
-from bunraku.ingest.takes import MAX_TAKES, TakesOperation, TakesOutcome, create_takes_job
+from bunraku.ingest.takes import MAX_LATER_JOBS, MAX_TAKES, TakesOperation, TakesOutcome, create_takes_job
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.problem import ProblemError
@@ -113,6 +113,23 @@ async def test_takes_that_would_delay_the_answer_follow(context: ServiceContext,
     running.cancel()
     await asyncio.wait((running,))
     assert await stored_names(context) == [*CLIPS]
+
+
+async def test_few_jobs_of_a_subject_are_finished_later(context: ServiceContext, tmp_path: Path) -> None:
+    operation, queue = create_operation(context, answer_s=0.0)
+    files = [write_zip({**CLIPS, "note": b"%d" % number}) for number in range(MAX_LATER_JOBS + 1)]
+
+    async def send(number: int) -> TakesOutcome:
+        path, job = write_source(tmp_path, files[number])
+        return await operation.receive(queue, job, path, UploadProgress())
+
+    for number in range(MAX_LATER_JOBS):
+        assert (await send(number)).status == 202
+    with pytest.raises(ProblemError) as raised:
+        await send(MAX_LATER_JOBS)
+    assert (raised.value.status, raised.value.title) == (503, "Out of time")
+    assert await count_jobs(context) == MAX_LATER_JOBS
+    assert (await send(0)).status == 202
 
 
 async def test_another_replica_goes_on_after_a_crash(context: ServiceContext, tmp_path: Path) -> None:

@@ -116,7 +116,12 @@ async def run_job(
 
 async def list_takes(path: Path, limit: int, timeout_s: float) -> TakeList | JobRejection:
     """Return the first `limit` takes of a motion file, read in a worker process, or a rejection as `run_job` does."""
-    return await _run(JobKind.MOTION, _call_list_takes, (path, limit), timeout_s, None, (TakeList, JobRejection))
+    records = (TakeList, JobRejection)
+    try:
+        return await worker_process.run_in_worker(_call_list_takes, (path, limit), timeout_s, None, records)
+    except WorkerFailed:
+        # one file of an archive may be too much for its reader: unopened, each file is one take
+        return await _run(JobKind.MOTION, _call_list_files, (path, limit), timeout_s, None, records)
 
 
 async def _run(
@@ -145,6 +150,13 @@ def _call_list_takes(path: Path, limit: int) -> TakeList | JobRejection:
     from bunraku.ingest.jobs.motion import list_file_takes
 
     return list_file_takes(path, limit)
+
+
+def _call_list_files(path: Path, limit: int) -> TakeList | JobRejection:
+    """List takes without opening the files of an archive, in the worker process."""
+    from bunraku.ingest.jobs.motion import list_file_takes
+
+    return list_file_takes(path, limit, opens_files=False)
 
 
 def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:

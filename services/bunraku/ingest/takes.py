@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from bunraku.ingest.entry import entry_json
 from bunraku.ingest.job_process import list_takes
-from bunraku.ingest.job_queue import JobDetails, JobQueue, UploadJob
+from bunraku.ingest.job_queue import MAX_OBSERVED_JOBS, JobDetails, JobQueue, UploadJob
 from bunraku.ingest.motion import MotionOperation, derive_take_id
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
@@ -24,6 +23,8 @@ from bunraku.storage.motion_id import derive_job_id, derive_motion_id
 
 MAX_TAKES = 64
 """Takes of one file that are stored."""
+MAX_LATER_JOBS = 4
+"""Answered jobs of one subject with which a replica leaves the queue: their files take space."""
 
 
 def create_takes_job(digest: bytes, filename: str, subject: str) -> UploadJob:
@@ -75,8 +76,11 @@ class TakesOperation:
         answer_s: float | None = None,
     ) -> None:
         """`answer_s` is the time after which `receive` returns, by default that of one upload."""
+        self._context = context
         self._worker_slots = worker_slots
         self._motions = motions
+        # subjects of the jobs with which the queue goes on
+        self._later_jobs: dict[str, str] = {}
         self._timeout_s = context.settings.upload_seconds
         self._answer_s = self._timeout_s if answer_s is None else answer_s
 
@@ -84,14 +88,34 @@ class TakesOperation:
         """Run a job of `create_takes_job`; raise `ProblemError`.
 
         If several takes need more time than one upload may, return, so that the client is answered: `queue` goes on
-        with the job.
+        with the job, unless it has `MAX_LATER_JOBS` of the subject.
         """
         outcome = TakesOutcome()
-        # a cancelled job stays with the queue
-        with contextlib.suppress(TimeoutError):
+        try:
             async with asyncio.timeout(None) as time_limit, queue.persist_job(job, path):
                 await self._store_takes(job.details, path, progress, outcome, time_limit)
+        except TimeoutError:
+            # a cancelled job stays with the queue
+            if not await self._may_finish_later(job):
+                await queue.discard_job(job.id)
+                hint = "send the file again later: its other takes are then stored"
+                problem = ProblemError(503, "Out of time", "the server had no time for it", hint=hint)
+                outcome.skipped += [(take, problem) for take in outcome.pending]
+                outcome.pending.clear()
+                if not outcome.stored:
+                    raise _find_main_problem(outcome.skipped) from None
         return outcome
+
+    async def _may_finish_later(self, job: UploadJob) -> bool:
+        """Count the job among the unfinished ones of its subject, and return True, if there are few enough."""
+        unfinished = await self._context.catalogue.list_job_holds(MAX_OBSERVED_JOBS)
+        self._later_jobs = {job_id: subject for job_id, subject in self._later_jobs.items() if job_id in unfinished}
+        subject = job.details["subject"]
+        others = [job_id for job_id, one in self._later_jobs.items() if one == subject and job_id != job.id]
+        if len(others) >= MAX_LATER_JOBS:
+            return False
+        self._later_jobs[job.id] = subject
+        return True
 
     async def run_job(self, details: JobDetails, path: Path, progress: UploadProgress) -> TakesOutcome:
         """Run a job of `create_takes_job` without a limit on its total time (a `JobHandler`)."""

@@ -91,10 +91,10 @@ def _describe_extension(analysis: Analysis, extension: ExtensionMotion) -> dict[
     }
 
 
-def list_file_takes(path: Path, limit: int) -> TakeList | JobRejection:
-    """Return the first `limit` takes of the file at `path`; none if it is one motion."""
+def list_file_takes(path: Path, limit: int, opens_files: bool = True) -> TakeList | JobRejection:
+    """Return the first `limit` takes of the file at `path`, as `list_takes` does; none if it is one motion."""
     try:
-        return list_takes(path.read_bytes(), limit)
+        return list_takes(path.read_bytes(), limit, opens_files)
     except UnreadableMotion as error:
         return _reject(error)
 

@@ -60,12 +60,16 @@ def read_motion(data: bytes, take: str | None = None) -> AnyMotion:
     return parse_bvh(data)
 
 
-def list_takes(data: bytes, limit: int) -> TakeList:
+def list_takes(data: bytes, limit: int, opens_files: bool = True) -> TakeList:
     """Return the first `limit` takes of a motion file; none if the file is one motion.
 
-    Raises `UnreadableMotion` if the file cannot be opened. A take that is listed may be unreadable.
+    Without `opens_files`, no reader of a format is called: each file of an archive is one take, and another file one
+    motion. Raises `UnreadableMotion` if the file cannot be opened. A take that is listed may be unreadable.
     """
-    names = _list_archive(Archive(data), limit) if data.startswith(ZIP_MAGIC) else _list_animations(data)
+    if data.startswith(ZIP_MAGIC):
+        names = _list_archive(Archive(data), limit if opens_files else 0)
+    else:
+        names = _list_animations(data) if opens_files else []
     return TakeList(names[:limit], len(names)) if len(names) > 1 else TakeList([], 0)
 
 

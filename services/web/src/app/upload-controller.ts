@@ -18,7 +18,7 @@ export interface UploadTarget {
 
 let queue: UploadQueue | null = null;
 
-/** Append files to the queue of the page. The longest motion of the first of them is played. */
+/** Append files to the queue of the page. The longest motion of the first of them is played when it is stored. */
 export function uploadFiles(target: UploadTarget, files: readonly File[]): void {
   queue ??= new UploadQueue({
     upload: uploadTakes,

@@ -64,13 +64,13 @@ describeInBrowser("file drop", { server: "open" }, ({ open }) => {
     await page.locator(".motion", { hasText: "queue-four" }).waitFor();
     await page.locator(".motion", { hasText: "queue-one" }).waitFor();
     expect(await page.locator(".motion", { hasText: "queue-three" }).count()).toBe(0);
-    await page.locator(".upload").waitFor({ state: "hidden" });
+    await page.locator(".upload").waitFor({ state: "detached" });
     await page.locator(".problem").getByRole("button", { name: "Dismiss" }).press("Enter");
     expect(await page.evaluate(() => document.activeElement?.className)).toBe("drop");
     const again = await holdUploads(page);
     await page.evaluate(dispatchDrag, { type: "drop", files });
     await page.getByRole("button", { name: "Cancel all uploads" }).press("Enter");
-    await page.locator(".upload").first().waitFor({ state: "hidden" });
+    await page.locator(".upload").first().waitFor({ state: "detached" });
     expect(await page.evaluate(() => document.activeElement?.className)).toBe("drop");
     again();
   });

@@ -4,7 +4,7 @@ import { formatPercent } from "../../i18n/number-format";
 import { joinList, translate } from "../../i18n/translator";
 import { element, setText } from "../dom";
 import { formatIngestStage, formatUploadProgress } from "../format";
-import { createProgressRow } from "./progress-row";
+import { createProgressRow, removeItem } from "./progress-row";
 
 export interface UploadRow {
   /** Show the progress of a file of `size` bytes, `seconds` after its start. */
@@ -41,14 +41,10 @@ export function createUploadList(root: HTMLElement, next: HTMLElement, cancelAll
     { class: "text-button", type: "button", "aria-label": translate("Cancel all uploads"), onClick: cancelAll },
     translate("Cancel all"),
   );
-  const summary = element(
-    "div",
-    { class: "upload", hidden: true },
-    element("div", { class: "upload-row" }, text, stop),
-  );
+  const summary = element("div", { class: "upload" }, element("div", { class: "upload-row" }, text, stop));
   summary.append(bar);
   const rows = element("div", { class: "upload-list" });
-  root.replaceChildren(summary, rows);
+  root.replaceChildren(rows);
   return {
     addFile(name, cancel) {
       const row = createProgressRow(rows, "upload", name, cancel);
@@ -58,12 +54,11 @@ export function createUploadList(root: HTMLElement, next: HTMLElement, cancelAll
       };
     },
     showSummary(shown) {
-      const hadFocus = summary.contains(document.activeElement);
-      summary.hidden = shown === null;
       if (shown === null) {
-        if (hadFocus) next.focus();
+        removeItem(summary, next);
         return;
       }
+      if (!summary.isConnected) root.prepend(summary);
       const { number, count, fraction } = shown;
       const percent = Math.floor(fraction * 100);
       setText(text, joinList([translate("File {number} of {count}", { number, count }), formatPercent(percent / 100)]));

@@ -14,8 +14,8 @@ export interface UploadQueueOptions {
   /** Create the list in which uploads are shown. */
   createList(cancelAll: () => void): UploadList;
   /**
-   * Called with the motions of a file, whether it is the first file with any, and whether the library has more to show:
-   * files that wait, or takes that were left out.
+   * Called with the motions of a file, whether it is the first with any of the files that were added together, and
+   * whether the library has more to show: files that wait, or takes that were left out.
    */
   onStored(motions: readonly Motion[], isFirst: boolean, hasMore: boolean): Promise<void>;
   /** Called with the number of takes that the server stores later. */
@@ -28,6 +28,12 @@ interface Entry {
   readonly file: File;
   readonly abort: AbortController;
   readonly row: UploadRow;
+  readonly batch: Batch;
+}
+
+/** Files that were added together. */
+interface Batch {
+  hasStored: boolean;
 }
 
 export class UploadQueue {
@@ -50,9 +56,10 @@ export class UploadQueue {
       [this.#count, this.#finished, this.#stored] = [0, 0, 0];
       if (files.length > 0) this.options.library.clearProblems();
     }
+    const batch: Batch = { hasStored: false };
     for (const file of files) {
-      const abort = new AbortController();
-      const entry: Entry = { file, abort, row: this.#list.addFile(file.name, () => this.#cancel(entry)) };
+      const row = this.#list.addFile(file.name, () => this.#cancel(entry));
+      const entry: Entry = { file, abort: new AbortController(), row, batch };
       this.#waiting.push(entry);
     }
     this.#count += files.length;
@@ -88,7 +95,7 @@ export class UploadQueue {
     this.options.onFinished(this.#stored);
   }
 
-  async #upload({ file, abort, row }: Entry): Promise<void> {
+  async #upload({ file, abort, row, batch }: Entry): Promise<void> {
     const startMs = performance.now();
     const { upload, library, onStored, onPending } = this.options;
     this.#showSummary(0);
@@ -105,7 +112,8 @@ export class UploadQueue {
       row.remove();
       showSkipped(library, file.name, skipped);
       if (pending.length > 0) onPending(pending.length);
-      const isFirst = this.#stored === 0 && items.length > 0;
+      const isFirst = !batch.hasStored && items.length > 0;
+      batch.hasStored ||= isFirst;
       this.#stored += items.length;
       await onStored(items, isFirst, this.#waiting.length > 0 || skipped.length > 0);
     } catch (error) {

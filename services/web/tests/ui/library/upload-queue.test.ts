@@ -100,12 +100,13 @@ test("one file has no summary, and files can be added meanwhile", async () => {
   const { queue, log, started, getSummary } = createQueue();
   const finished = queue.add(files("a"));
   expect(getSummary()).toBeNull();
-  void queue.add(files("b"));
-  expect(getSummary()).toEqual({ number: 1, count: 2, fraction: 0 });
-  (await started("a")).resolve({});
-  (await started("b")).resolve({ items: [motion("b1")] });
+  void queue.add(files("b", "c"));
+  expect(getSummary()).toEqual({ number: 1, count: 3, fraction: 0 });
+  (await started("a")).resolve({ items: [motion("a1")] });
+  (await started("b")).resolve({});
+  (await started("c")).resolve({ items: [motion("c1")] });
   await finished;
-  expect(log).toEqual(["clear", "stored , more", "stored b1, first", "finished 1"]);
+  expect(log).toEqual(["clear", "stored a1, first, more", "stored , more", "stored c1, first", "finished 2"]);
 });
 
 test("a waiting or running upload is cancelled without a message", async () => {
