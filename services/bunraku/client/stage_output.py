@@ -74,7 +74,16 @@ class VmcOutput:
         assert track is not None, "a performer with a pose has a track"
         self._started_at = reference if self._started_at is None else self._started_at
         seconds = (reference - self._started_at) / 1e6
-        messages = vmc.make_frame(track.figure, *found, seconds, scale=self._scale, root_motion=self._root_motion)
+        extension = self._viewer.extension_of(self._performer)
+        extended = self._viewer.extended_pose_at(reference, self._performer)
+        messages = vmc.make_frame(
+            track.figure,
+            *found,
+            seconds,
+            extended=(extension, extended) if extension is not None and extended is not None else None,
+            scale=self._scale,
+            root_motion=self._root_motion,
+        )
         for datagram in pack_datagrams(messages, self._single):
             self._send(datagram)
         self.frames += 1

@@ -24,7 +24,7 @@ from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.delivery.resume import MAX_BLOCKS, HeldBlocks, ResumeState
-from bunraku.motion.extension import ExtendedPose, extend_pose
+from bunraku.motion.extension import BodyExtension, ExtendedPose, extend_pose
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import world_transforms
 from bunraku.playout import timeline
@@ -206,6 +206,11 @@ class Viewer:
         figure = motion.track.figure
         placed = world_transforms(figure, pose[0][None], pose[1][None])
         return extend_pose(figure, store.track.extension, *placed, values[None])
+
+    def extension_of(self, performer: int = 0) -> BodyExtension | None:
+        """Return the extension of a performer, None if there is none."""
+        store = self._tracks.extensions.get(performer) if self._tracks is not None else None
+        return store.track.extension if store is not None else None
 
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:
         """Return the seven values (7,) of the camera or light `scenes[scene]` at `reference`, or None

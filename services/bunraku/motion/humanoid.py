@@ -7,6 +7,8 @@ that a tool that applies positions places every joint of the figure exactly whil
 turns, the rotations of all bones stay exact, and the trunk is moved a little, because it hangs from the hips here and
 from the root in the figure. UpperChest coincides with Chest, because many avatars have no UpperChest.
 
+An extension turns Spine, Chest, Neck and the shoulders; UpperChest stays with Chest.
+
 Frame: the figure's (`motion.skeleton`): right-handed, metres, y up, facing z, x to the left. Bone names are those of
 Unity's HumanBodyBones.
 """
@@ -16,6 +18,7 @@ from __future__ import annotations
 import numpy as np
 
 from bunraku.motion import rotation
+from bunraku.motion.extension import BodyExtension, ExtendedPose, JointKind
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS, Figure
 
@@ -114,3 +117,41 @@ def bone_offsets(figure: Figure) -> Array:
     offsets: Array = placed - placed[list(BONE_PARENTS)]
     offsets[0] = 0.0
     return offsets
+
+
+def extended_bones(extension: BodyExtension, pose: ExtendedPose) -> tuple[Array, Array]:
+    """Return positions (22, 3) and rotations (22, 4) of `BONES` in their parents' frames, for a pose of one instant.
+
+    The hips' position and rotation are in the world frame. Positions of other bones are constant, except between bones
+    of the trunk that leave out joints of the spine.
+    """
+    positions, orientations = np.empty((len(BONES), 3)), np.empty((len(BONES), 4))
+    joints, kinds = pose.positions[0], extension.kinds
+    for index, (name, _, joint) in enumerate(_TABLE):
+        if joint is not None and name != "Spine":
+            number = JOINT_INDEX[joint]
+            positions[index] = joints[number]
+            orientations[index] = rotation.multiply(pose.orientations[0, number], T_POSE_TO_REST[number])
+            continue
+        kind = _EXTENDED_KINDS.get(name)
+        extra = kinds.index(kind) if kind in kinds else extension.spine_count - 1
+        extra = min(extra, 0) if name == "Spine" else extra
+        if extra < 0:
+            positions[index], orientations[index] = joints[0], pose.orientations[0, 0]
+        else:
+            positions[index], orientations[index] = pose.extra_positions[0, extra], pose.extra_orientations[0, extra]
+    local_positions, local_rotations = positions.copy(), orientations.copy()
+    for index, parent in enumerate(BONE_PARENTS):
+        if parent >= 0:
+            inverse = rotation.conjugate(orientations[parent])
+            local_positions[index] = rotation.rotate(inverse, positions[index] - positions[parent])
+            local_rotations[index] = rotation.multiply(inverse, orientations[index])
+    return local_positions, local_rotations
+
+
+_EXTENDED_KINDS = {
+    "Neck": JointKind.NECK,
+    "LeftShoulder": JointKind.LEFT_CLAVICLE,
+    "RightShoulder": JointKind.RIGHT_CLAVICLE,
+}
+"""Joint of an extension that each bone follows; other bones of the trunk follow the spine."""

@@ -12,7 +12,15 @@ from __future__ import annotations
 import numpy as np
 from pythonosc.osc_message import OscMessage
 
-from bunraku.motion.humanoid import BONES, bone_offsets, bone_rotations, hips_position, rest_hips_position
+from bunraku.motion.extension import BodyExtension, ExtendedPose
+from bunraku.motion.humanoid import (
+    BONES,
+    bone_offsets,
+    bone_rotations,
+    extended_bones,
+    hips_position,
+    rest_hips_position,
+)
 from bunraku.motion.rotation import IDENTITY, Array
 from bunraku.motion.skeleton import Figure
 from bunraku.motion.unity_axes import mirror_rotations, mirror_vectors, to_xyzw
@@ -24,7 +32,14 @@ MODEL_LOADED = 1
 
 
 def make_frame(
-    figure: Figure, root: Array, rotations: Array, seconds: float, *, scale: float = 1.0, root_motion: bool = False
+    figure: Figure,
+    root: Array,
+    rotations: Array,
+    seconds: float,
+    *,
+    extended: tuple[BodyExtension, ExtendedPose] | None = None,
+    scale: float = 1.0,
+    root_motion: bool = False,
 ) -> list[OscMessage]:
     """Return the messages of one frame.
 
@@ -33,15 +48,19 @@ def make_frame(
         root: Position (3,) of the root in metres, world frame.
         rotations: Rotations (18, 4) of the joints, as in `motion.skeleton.Motion`.
         seconds: Time of the frame since the first one.
+        extended: Extension of the performer with its pose at this instant, which turns chest, neck and shoulders.
         scale: Factor of all positions: the height of the avatar's hips in proportion to the figure's.
         root_motion: Move the root instead of the hips, which then stay at their position in the T-pose. It is for
             receivers that ignore the positions of bones.
     """
-    positions = bone_offsets(figure)
+    if extended is None:
+        positions, local_rotations = bone_offsets(figure), bone_rotations(rotations)
+    else:
+        positions, local_rotations = extended_bones(*extended)
     hips = hips_position(figure, root, rotations)
     positions[0] = rest_hips_position(figure) if root_motion else hips
     moved = hips - positions[0]
-    turns = to_xyzw(mirror_rotations(bone_rotations(rotations)))
+    turns = to_xyzw(mirror_rotations(local_rotations))
     messages = [_make_transform("/VMC/Ext/Root/Pos", "root", scale * mirror_vectors(moved), to_xyzw(IDENTITY))]
     messages += [
         _make_transform("/VMC/Ext/Bone/Pos", bone, position, turn)

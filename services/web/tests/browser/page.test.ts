@@ -44,6 +44,8 @@ describeInBrowser("page of an empty server", { server: "empty" }, ({ open }) => 
     expect(await page.locator(".brand-piece").innerText()).toBe("perfume_A");
     expect(await page.locator(".problem").count()).toBe(0);
     expect(await page.getByRole("button", { name: "Pause" }).isVisible()).toBe(true);
+    // The clip has a spine, a neck and clavicles.
+    await waitInEngine(page, () => Boolean(globalThis.bunraku.viewer.poseAt(performance.now())?.extended));
     await page.getByRole("button", { name: "Close library" }).click();
 
     const before = await jointPosition(page, "r_wrist");
