@@ -18,10 +18,14 @@ from bunraku.codec.audio import MAX_BLOCK_BYTES as LARGEST_AUDIO
 from bunraku.codec.audio import pack_audio_block, unpack_audio_block
 from bunraku.codec.coefficients import MAX_BLOCK_BYTES
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension_track import ExtensionTrack, decode_extension_block, unpack_extension
 from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_track import MOTION_CODEC, MotionTrack, parse_motion_track
 from bunraku.codec.prior import MAX_BLOCK_FRAMES, load_shipped_prior
 from bunraku.codec.skeleton_description import MAX_SKELETON_BYTES, SkeletonDescription
+from bunraku.motion.extension import extend_pose
+from bunraku.motion.rotation import IDENTITY
+from bunraku.motion.skeleton import JOINT_COUNT, world_transforms
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Description, unpack
 from tests.vectors.blocks import random_coefficients
@@ -126,6 +130,28 @@ def audio(data: bytes) -> bool:
     return True
 
 
+def extension(data: bytes) -> bool:
+    """Parse the joints of an extension, whose length is the first byte, decode the block that follows, and pose it."""
+    size = data[0] if data else 0
+    try:
+        track = ExtensionTrack(30.0, 30, 30, 30, 0, unpack_extension(data[1 : 1 + size]))
+        assert np.isfinite(track.weights).all()
+        assert np.isfinite(track.inverse_weights).all()
+        block = decode_extension_block(track, data[1 + size :])
+    except DamagedBlock:
+        return False
+    assert block.q.nbytes + block.values.nbytes <= MAX_DECODED_BYTES
+    values = block.values_at(np.array([-0.5, block.frames - 0.5]))
+    assert values.shape == (2, len(track.extension.names), 3)
+    figure = TRACKS[0].figure
+    still = np.tile(IDENTITY, (2, JOINT_COUNT, 1))
+    pose = extend_pose(figure, track.extension, *world_transforms(figure, np.zeros((2, 3)), still), values)
+    for numbers in pose:
+        assert np.isfinite(numbers).all()
+    assert np.allclose(np.linalg.norm(pose.extra_orientations, axis=-1), 1.0)
+    return True
+
+
 def check_track(described: dict[str, Any]) -> MotionTrack:
     """Parse a track of a Description and check its timing; raise `DamagedBlock`."""
     track = parse_motion_track(described)
@@ -138,7 +164,7 @@ def check_track(described: dict[str, Any]) -> MotionTrack:
     return track
 
 
-TARGETS: tuple[Callable[[bytes], bool], ...] = (block, skeleton_description, message, audio)
+TARGETS: tuple[Callable[[bytes], bool], ...] = (block, skeleton_description, message, audio, extension)
 
 
 def _largest_block() -> bytes:
@@ -160,4 +186,9 @@ def load_seeds() -> list[tuple[int, bytes]]:
     seeds += [(2, base64.b64decode(v["bytes"])) for v in messages["valid"] + messages["invalid"]]
     sounds = load_golden("audio.json")
     seeds += [(3, base64.b64decode(v["block"])) for v in sounds["valid"] + sounds["invalid"]]
+    extensions = load_golden("extension.json")
+    joints = [base64.b64decode(track["joints"]) for track in extensions["tracks"]]
+    for vector in [*extensions["valid"], *extensions["invalid"]]:
+        described = joints[vector.get("track", 0)]
+        seeds.append((4, bytes([len(described)]) + described + base64.b64decode(vector["block"])))
     return seeds
