@@ -88,7 +88,7 @@ describeInBrowser("library", { server: "open" }, (fixture) => {
   });
 
   test("name and tags are changed in place", async () => {
-    const { id } = await upload(fixture, "Stork", 64);
+    const { id } = await upload(fixture, "Stork", 271);
     const page = await open("", DESKTOP);
     await openLibrary(page);
     await page.getByRole("searchbox").fill("stork");
@@ -146,7 +146,7 @@ describeInBrowser("library", { server: "open" }, (fixture) => {
   });
 
   test("a part, mirrored and looped, becomes a new motion on the stage", async () => {
-    const { id } = await upload(fixture, "Crane", 90);
+    const { id } = await upload(fixture, "Crane", 272);
     const page = await open("", DESKTOP);
     await openLibrary(page);
     await page.getByRole("searchbox").fill("crane");
