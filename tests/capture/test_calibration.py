@@ -69,7 +69,7 @@ def test_frames_of_no_body_are_rejected() -> None:
         (frame.positions, {"Hips": IDENTITY}, "humanoid"),
         (frame.positions, legless, "humanoid"),
         (frame.positions, headless_tree, "Separate joints"),
-        (collapsed, frame.rotations, "Not a body|Not a humanoid"),
+        (collapsed, frame.rotations, "Not a body|Not a humanoid|A leg without length"),
     ):
         with pytest.raises(UnreadableCapture, match=problem):
             calibrate(SKELETON, [CapturedFrame(positions, rotations)])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from bunraku.http.access_control import Access, Role
 from bunraku.runtime.display_text import MAX_NAME_CHARACTERS, clean_text
@@ -29,6 +29,11 @@ def _clean_tag(tag: str) -> str:
     return _require_visible(clean_text(tag, MAX_TAG_CHARACTERS))
 
 
+def _refuse_empty(text: Any) -> Any:
+    """Give an empty text the reason of one without a visible character."""
+    return _require_visible(text) if isinstance(text, str) else text
+
+
 def _require_visible(text: str) -> str:
     if not text:
         raise ValueError("it must have at least one visible character")
@@ -48,8 +53,9 @@ def _omit_default(schema: dict[str, Any]) -> None:
     schema.pop("default", None)
 
 
-Name = Annotated[str, Field(min_length=1, max_length=MAX_NAME_CHARACTERS), AfterValidator(clean_name)]
-Tag = Annotated[str, Field(min_length=1, max_length=MAX_TAG_CHARACTERS), AfterValidator(_clean_tag)]
+_Text = Annotated[str, BeforeValidator(_refuse_empty)]
+Name = Annotated[_Text, Field(min_length=1, max_length=MAX_NAME_CHARACTERS), AfterValidator(clean_name)]
+Tag = Annotated[_Text, Field(min_length=1, max_length=MAX_TAG_CHARACTERS), AfterValidator(_clean_tag)]
 
 
 class Labels(BaseModel):
