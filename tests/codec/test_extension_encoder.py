@@ -45,9 +45,9 @@ def test_decoded_joints_are_as_near_as_those_of_the_motion(level: int) -> None:
     assert apart.mean() <= 1.5 * MOTION.ladder[level].mean_error_mm
 
 
-def test_extension_costs_a_quarter_of_the_motion_at_most() -> None:
+def test_extension_of_a_swinging_dance_costs_a_third_of_the_motion_at_most() -> None:
     added = sum(map(len, ENCODED.ladder[2].blocks)) + len(pack_extension(EXTENSION))
-    assert added <= 0.4 * sum(map(len, MOTION.ladder[2].blocks))
+    assert added <= 0.34 * sum(map(len, MOTION.ladder[2].blocks))
 
 
 def test_values_that_are_too_large_are_an_error() -> None:

@@ -88,15 +88,19 @@ class SkeletonDescription:
         return cls(Figure(lengths[:JOINT_COUNT], tips), grid, reference, bits)
 
 
+class BoneTooLong(ValueError):
+    """Bone that no integer of a skeleton description can hold."""
+
+
 def grid_unit_m(grid: int) -> float:
     """Return the unit of a figure's integers, metres."""
     return FINEST_GRID_M * 2.0**grid
 
 
 def snap_to_grid(figure: Figure, grid: int) -> Figure:
-    """Return `figure` as it will be decoded. Raises ValueError for a bone that is too long for the grid."""
+    """Return `figure` as it will be decoded. Raises `BoneTooLong` for a bone that is too long for the grid."""
     integers = np.round(np.concatenate([figure.offsets, figure.tips]) / grid_unit_m(grid))
     if abs(integers).max() >= INTEGER_LIMIT // 2:
         longest, limit = abs(integers).max() * grid_unit_m(grid), INTEGER_LIMIT // 2 * grid_unit_m(grid)
-        raise ValueError(f"A bone is {longest:.1f} m long; {limit:.1f} m is the limit. Check the unit of length.")
+        raise BoneTooLong(f"A bone is {longest:.1f} m long; {limit:.1f} m is the limit.")
     return Figure(integers[:JOINT_COUNT] * grid_unit_m(grid), integers[JOINT_COUNT:] * grid_unit_m(grid))

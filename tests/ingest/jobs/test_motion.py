@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import msgpack
@@ -41,6 +42,19 @@ def test_invalid_file_is_rejected_with_a_hint(tmp_path: Path) -> None:
     rejected = encode_file("m1", source)
     assert isinstance(rejected, JobRejection)
     assert rejected.line is not None
+    assert rejected.hint
+
+
+@pytest.mark.parametrize("joint", ["Neck", "Head"])
+def test_bone_that_is_too_long_is_rejected_with_a_hint(joint: str, tmp_path: Path) -> None:
+    dance = extended_source(20)
+    places = dance.rest_positions.copy()
+    places[dance.names.index(joint) : dance.names.index("Head") + 1, 1] += 5.0
+    source = tmp_path / "source"
+    source.write_bytes(write_source_bvh(replace(dance, rest_positions=places)))
+    rejected = encode_file("m1", source)
+    assert isinstance(rejected, JobRejection)
+    assert rejected.title == "Bone too long"
     assert rejected.hint
 
 

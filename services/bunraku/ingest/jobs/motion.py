@@ -12,6 +12,7 @@ from bunraku.codec import motion_encoder
 from bunraku.codec.container import pack_motion
 from bunraku.codec.extension_encoder import encode_extension
 from bunraku.codec.extension_track import EXTENSION_TYPE
+from bunraku.codec.skeleton_description import BoneTooLong
 from bunraku.ingest.jobs.encoding import describe_encoding, encode_motions
 from bunraku.ingest.result import NOTHING_MOVES, JobRejection, JobResult
 from bunraku.marionette.limb_rig import ArmRig, Limb
@@ -56,7 +57,10 @@ def encode_file(
         hint = "a single pose is stored if its take is uploaded by its name"
         return JobRejection(NOTHING_MOVES, "it is a single pose", hint=hint)
     on_progress(0.0)
-    (encoded,) = encode_motions([analysis.motion], on_progress)
+    try:
+        (encoded,) = encode_motions([analysis.motion], on_progress)
+    except BoneTooLong as error:
+        return JobRejection("Bone too long", str(error), hint="check the unit of length and the joints' offsets")
     extension = analysis.extension
     extensions = []
     if extension is not None:

@@ -37,7 +37,7 @@ export class ExtendedBones {
   apply(pose: ExtendedPose): void {
     if (this.#extension !== pose.extension) this.#setExtension(pose.extension);
     this.#setWorld("humanoid_root", pose.positions, pose.orientations, 0);
-    for (const [name, joint] of trunkJointsOf(pose.extension)) {
+    for (const [name, joint] of pairTrunkBones(pose.extension)) {
       if (joint < 0) {
         this.#setWorld(name, pose.positions, pose.orientations, VL5);
       } else {
@@ -83,7 +83,7 @@ export class ExtendedBones {
       r_clavicle: [ends.get("r_shoulder") as Vector3, figureRest("r_shoulder")],
     };
     this.#pivots = new Map(
-      trunkJointsOf(extension).map(([name, joint]) => {
+      pairTrunkBones(extension).map(([name, joint]) => {
         const [extended, figure] = anchors[name];
         const pivot = extended.clone().sub(figure).add(figureRest("vl5"));
         return [name, joint < 0 ? pivot : pivot.sub(rest.joints[joint])];
@@ -119,7 +119,7 @@ const scratch = new Vector3();
 const scratchRotation = new Quaternion();
 
 /** Return the bones of the trunk with the joint of the extension that moves each; -1 is the figure's own vl5. */
-function trunkJointsOf({ kinds }: BodyExtension): [bone: string, joint: number][] {
+function pairTrunkBones({ kinds }: BodyExtension): [bone: string, joint: number][] {
   const chest = kinds.lastIndexOf("spine");
   const orChest = (kind: JointKind) => (kinds.includes(kind) ? kinds.indexOf(kind) : chest);
   return [

@@ -146,7 +146,7 @@ export class Puppet implements Performer {
       rotation.set(orientations[k * 4 + 1], orientations[k * 4 + 2], orientations[k * 4 + 3], orientations[k * 4]);
       matrix
         .makeRotationFromQuaternion(rotation)
-        .setPosition(...(positions.subarray(k * 3, k * 3 + 3) as unknown as [number, number, number]));
+        .setPosition(positions[k * 3], positions[k * 3 + 1], positions[k * 3 + 2]);
     });
   }
 
