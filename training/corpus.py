@@ -50,6 +50,22 @@ def licensed_clips(corpus: Path) -> set[str]:
         }
 
 
+def read_performers(corpus: Path) -> dict[str, list[str]]:
+    """Return the licensed clips of each family of performers, as `CORPUS.csv` names them in its column `family`."""
+    licensed = licensed_clips(corpus)
+    families: dict[str, list[str]] = {}
+    with (corpus / "CORPUS.csv").open(encoding="utf-8", newline="") as rows:
+        for row in csv.DictReader(rows):
+            if row["clip"] in licensed:
+                families.setdefault(row["family"], []).append(row["clip"])
+    return families
+
+
+def reduce_frame_rate(motion: Motion, factor: int) -> Motion:
+    """Return every `factor`-th frame of the motion."""
+    return Motion(motion.figure, motion.fps / factor, motion.root[::factor], motion.rotations[::factor])
+
+
 def mirror_motion(motion: Motion) -> Motion:
     """Return the motion with left and right exchanged."""
     mirror = [JOINTS.index({"l_": "r_", "r_": "l_"}.get(n[:2], n[:2]) + n[2:]) for n in JOINTS]

@@ -33,7 +33,7 @@ _WEIGHT_DECAY = (5e-5, 5e-4, 5e-5, 5e-4, 0.0, 0.0, 0.0)
 _DECAYS_TO_MEAN = (False, True, False, True, False, False, False)
 
 
-def initial_parameters(seed: int = 0) -> list[Array]:
+def initial_parameters(seed: int = 0, hidden_units: int = HIDDEN_UNITS) -> list[Array]:
     """Return untrained parameters: linear, bias, hidden, hidden bias, hidden class, out, hazards (logits)."""
     random = np.random.default_rng(seed)
     linear, bias = np.zeros((FREQUENCY_CLASSES, FEATURE_COUNT)), np.full((FREQUENCY_CLASSES, CHANNEL_AXES), -0.8)
@@ -44,10 +44,10 @@ def initial_parameters(seed: int = 0) -> list[Array]:
     return [
         linear,
         bias,
-        random.normal(0, 0.15, (HIDDEN_UNITS, FEATURE_COUNT)),
-        np.zeros((HIDDEN_UNITS, CHANNEL_AXES)),
-        random.normal(0, 0.1, (HIDDEN_UNITS, FREQUENCY_CLASSES)),
-        random.normal(0, 0.02, (HIDDEN_UNITS, FREQUENCY_CLASSES)),
+        random.normal(0, 0.15, (hidden_units, FEATURE_COUNT)),
+        np.zeros((hidden_units, CHANNEL_AXES)),
+        random.normal(0, 0.1, (hidden_units, FREQUENCY_CLASSES)),
+        random.normal(0, 0.02, (hidden_units, FREQUENCY_CLASSES)),
         np.tile(np.log(p / (1 - p)), (HAZARD_TABLE_OF[-1] + 1, 1)),
     ]
 
@@ -83,7 +83,7 @@ def _accumulate_loss(
     """
     probabilities = 1 / (1 + np.exp(-hazard))
     d_probabilities = np.zeros_like(probabilities)
-    inner, f, loss = np.zeros(HIDDEN_UNITS), np.zeros(FEATURE_COUNT), 0.0
+    inner, f, loss = np.zeros(len(hidden)), np.zeros(FEATURE_COUNT), 0.0
     for example in range(len(rows)):
         row = rows[example]
         frequency_class, axis, magnitude = labels[row, 0], labels[row, 1], labels[row, 2]
@@ -91,7 +91,7 @@ def _accumulate_loss(
         for i in range(FEATURE_COUNT):
             f[i] = features[row, i] * 0.0625
             scale += linear[frequency_class, i] * f[i]
-        for j in range(HIDDEN_UNITS):
+        for j in range(len(hidden)):
             x = hidden_bias[j, axis] + hidden_class[j, frequency_class]
             for i in range(FEATURE_COUNT):
                 x += hidden[j, i] * f[i]
@@ -131,7 +131,7 @@ def _accumulate_loss(
             d_bias[frequency_class, axis] += slope
             for i in range(FEATURE_COUNT):
                 d_linear[frequency_class, i] += slope * f[i]
-            for j in range(HIDDEN_UNITS):
+            for j in range(len(hidden)):
                 if inner[j] > 0:
                     d_out[j, frequency_class] += slope * inner[j]
                     x = slope * out[j, frequency_class]
@@ -176,6 +176,21 @@ def train(
             report(f"  step {step}: {total_bits / 300:.4f} bits per coefficient, {time.monotonic() - started:.0f} s")
             total_bits = 0.0
     return parameters
+
+
+def count_magnitude_bits(
+    features: npt.NDArray[np.int16], labels: npt.NDArray[np.int32], parameters: list[Array]
+) -> float:
+    """Return the bits that the magnitudes of all examples cost, without signs."""
+    gradients = [np.zeros_like(p) for p in parameters]
+    return _accumulate_loss(features, labels, np.arange(len(labels)), *parameters, *gradients) / _LN2
+
+
+def to_parameters(prior: Prior) -> list[Array]:
+    """Return the parameters of a prior, the inverse of `quantise_prior`. They contain no signs."""
+    p = prior.hazard / 32768
+    arrays = prior.linear / 4096, prior.bias / 65536, prior.hidden / 4096, prior.hidden_bias / 65536
+    return [*arrays, prior.hidden_class / 65536, prior.out / 4096, np.log(p / (1 - p))]
 
 
 def quantise_prior(parameters: list[Array], labels: npt.NDArray[np.int32]) -> Prior:

@@ -17,7 +17,7 @@ from bunraku.codec import prior
 from bunraku.codec.block_encoder import MEAN_ERROR_REFINEMENT, BlockEncoder
 from bunraku.codec.channel_layout import MOTION_LAYOUT
 from bunraku.codec.coefficients import decode_coefficients, duration_level
-from bunraku.codec.motion_track import plan_motion_track
+from bunraku.codec.motion_track import MotionTrack, plan_motion_track
 from bunraku.codec.prior import Prior
 from bunraku.kernels import load_kernels
 from bunraku.motion.skeleton import CHANNEL_COUNT
@@ -31,6 +31,15 @@ MAX_CLIP_S = 36.0
 """Seconds of a clip that are used at each step, so that long clips do not outweigh the others."""
 
 TrainingExamples = tuple[npt.NDArray[np.int16], npt.NDArray[np.int32]]
+
+
+def read_examples(track: MotionTrack, data: bytes, current: Prior) -> TrainingExamples:
+    """Return features and labels of the coefficients of a block."""
+    header, q = decode_coefficients(current, data, track.block_frames, track.fps)
+    numbers = np.array([header.frames, header.step, header.heading, q.shape[2], CHANNEL_COUNT], dtype=np.int64)
+    level = duration_level(header.frames, track.fps)
+    features, labels = load_kernels("codec").collect_examples(current, MOTION_LAYOUT, q, numbers, level)
+    return features.astype(np.int16), labels.astype(np.int32)
 
 
 def collect_examples(folder: Path, clip: str, current: Prior, round_number: int) -> TrainingExamples:
@@ -48,14 +57,9 @@ def collect_examples(folder: Path, clip: str, current: Prior, round_number: int)
             if track.block_count > 3 and random.random() > share:
                 continue
             data = encoder.encode_block(index, step, MEAN_ERROR_REFINEMENT).data
-            header, q = decode_coefficients(current, data, track.block_frames, track.fps)
-            numbers = np.array([header.frames, header.step, header.heading, q.shape[2], CHANNEL_COUNT], dtype=np.int64)
-            level = duration_level(header.frames, track.fps)
-            block_features, block_labels = load_kernels("codec").collect_examples(
-                current, MOTION_LAYOUT, q, numbers, level
-            )
-            features.append(block_features.astype(np.int16))
-            labels.append(block_labels.astype(np.int32))
+            block_features, block_labels = read_examples(track, data, current)
+            features.append(block_features)
+            labels.append(block_labels)
     return np.concatenate(features), np.concatenate(labels)
 
 

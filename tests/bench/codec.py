@@ -2,9 +2,10 @@
 
 The last line printed is one JSON object. Every clip is encoded for a mean or maximum error with a prior that was not
 trained on its family. The bitrate counts all bytes that a viewer receives for the motion: blocks, headers of Data
-messages, WebSocket frames, and the skeleton description (limb lengths and references) of the Description. `--quick`
-takes every third clip. With PICTURE=FILE further error bounds are measured, and a chart of bitrate over error is
-written (SVG).
+messages, WebSocket frames, and the skeleton description (limb lengths and references) of the Description. Tails are the
+bitrate of the worst clip, and p95 of the bytes of a block. `served_ratio_...` compares each level of the ladder, as an
+upload is stored, with an encoding for that bound alone. `--quick` takes every third clip. With PICTURE=FILE further
+error bounds are measured, and a chart of bitrate over error is written (SVG).
 """
 
 from __future__ import annotations
@@ -21,52 +22,29 @@ import numpy as np
 
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import ERROR_BOUNDS_MM, encode_motion, encode_motion_to_mean_error, warm_up
-from bunraku.codec.motion_track import MotionTrack
-from bunraku.codec.prior import Prior, load_shipped_prior, parse_prior
 from bunraku.motion.skeleton import Motion
-from bunraku.wire.messages import Data
 from tests.bench import chart, peer_results
+from tests.bench.error_goals import (
+    ErrorGoal,
+    GoalEncoding,
+    encode_as_served,
+    encode_to_goal,
+    geometric_mean,
+    summarise_tails,
+)
 from training import corpus as clips
+from training import entropy_study
 
 ERROR_GOALS = (("mean", 1.0), ("mean", 5.0), ("max", 10.0), ("max", 2.0))
 PEERS = {"acl": "acl", "meshopt": "meshopt_brotli"}
 ERROR_COLUMNS = {"mean": peer_results.MEAN, "max": peer_results.MAX}
 CHART_ERRORS_MM = {"mean": (0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0), "max": (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 60.0)}
-PRIORS_FOLDER = Path(__file__).with_name("priors")
-
-
-def load_held_out_prior(name: str) -> Prior:
-    """Load the prior that was not trained on the clip's family."""
-    path = PRIORS_FOLDER / f"{clips.clip_family(name)}.json"
-    return parse_prior(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else load_shipped_prior()
-
-
-def received_bytes(track: MotionTrack, blocks: list[bytes]) -> int:
-    """Return the bytes that a viewer receives for a motion."""
-    packets = [len(Data(0, 0, index, block).pack()) for index, block in enumerate(blocks)]
-    framed = sum(size + (2 if size < 126 else 4) for size in packets)
-    return framed + len(track.skeleton.pack())
-
-
-def encode_to_goal(motion: Motion, goal: tuple[str, float], prior: Prior, block_seconds: float) -> float:
-    """Encode a motion for a goal and return its bitrate, kbit/s."""
-    kind, error = goal
-    if kind == "mean":
-        track, rate = encode_motion_to_mean_error(motion, error, block_seconds, prior)
-    else:
-        encoded = encode_motion(motion, block_seconds, (error,), prior=prior)
-        track, rate = encoded.track, encoded.ladder[0]
-    return received_bytes(track, rate.blocks) * 8e-3 / motion.duration
-
-
-def geometric_mean(values: list[float]) -> float:
-    return float(np.exp(np.mean(np.log(values))))
 
 
 def draw_chart(
     motions: dict[str, Motion],
     measured: dict[str, dict[str, peer_results.Rows]],
-    rates: dict[tuple[str, float], list[float]],
+    rates: dict[ErrorGoal, list[float]],
     block_seconds: float,
 ) -> str:
     """Draw the chart of bitrate over error; missing errors are measured and added to `rates` (kbit/s of each clip)."""
@@ -76,7 +54,7 @@ def draw_chart(
             goal = kind, error
             if goal not in rates:
                 rates[goal] = [
-                    encode_to_goal(motion, goal, load_held_out_prior(name), block_seconds)
+                    encode_to_goal(motion, goal, entropy_study.load_held_out_prior(name), block_seconds).kbps
                     for name, motion in motions.items()
                 ]
             print(f"drawn: {kind} {error:g} mm, {geometric_mean(rates[goal]):.2f} kbit/s", flush=True)
@@ -92,6 +70,34 @@ def draw_chart(
         f"{block_seconds:g} s. The others: whole clips at once."
     )
     return chart.draw_chart((panels[0], panels[1]), note)
+
+
+def measure_served_ladder(motions: dict[str, Motion]) -> dict[str, float]:
+    """Compare each level of the served ladder with an encoding for its bound alone, in blocks of one second.
+
+    Returns:
+        By level: bitrate and tails as served, and the ratio of the bitrates, of all clips and of the worst one.
+    """
+    served: dict[float, list[GoalEncoding]] = {bound: [] for bound in ERROR_BOUNDS_MM}
+    ratios: dict[float, list[float]] = {bound: [] for bound in ERROR_BOUNDS_MM}
+    for name, motion in motions.items():
+        prior = entropy_study.load_held_out_prior(name)
+        for bound, encoding in encode_as_served(motion, prior).items():
+            served[bound].append(encoding)
+            ratios[bound].append(encoding.kbps / encode_to_goal(motion, ("max", bound), prior, 1.0).kbps)
+        print(
+            f"{name:<16}served" + "".join(f"{served[b][-1].kbps:9.2f}{ratios[b][-1]:7.3f}" for b in ratios), flush=True
+        )
+    figures: dict[str, float] = {}
+    for bound, encodings in served.items():
+        level = {
+            "kbps": geometric_mean([encoding.kbps for encoding in encodings]),
+            **summarise_tails(encodings),
+            "ratio": geometric_mean(ratios[bound]),
+            "ratio_worst_clip": max(ratios[bound]),
+        }
+        figures |= {f"served_{key}_{bound:g}mm": round(value, 3) for key, value in level.items()}
+    return figures
 
 
 def measure_speeds(motions: dict[str, Motion]) -> dict[str, float]:
@@ -168,7 +174,7 @@ def main() -> None:
     names = [name for name in clips.list_clips(folder) if name in measured][:: 3 if options.quick else 1]
     motions = {name: clips.load_clip(folder, name) for name in names}
     ratios: dict[str, list[float]] = {}
-    rates: dict[tuple[str, float], list[float]] = {}
+    encodings: dict[ErrorGoal, list[GoalEncoding]] = {goal: [] for goal in ERROR_GOALS}
     print(
         f"{'clip':<16}"
         + "".join(f"{kind} {error:g} mm".rjust(12) + f"{'acl':>8}{'meshopt':>9}" for kind, error in ERROR_GOALS)
@@ -177,16 +183,26 @@ def main() -> None:
         row = f"{name:<16}"
         for kind, error in ERROR_GOALS:
             key = f"{kind}_{error:g}mm"
-            kbps = encode_to_goal(motion, (kind, error), load_held_out_prior(name), options.block_seconds)
-            rates.setdefault((kind, error), []).append(kbps)
+            encoding = encode_to_goal(
+                motion, (kind, error), entropy_study.load_held_out_prior(name), options.block_seconds
+            )
+            encodings[kind, error].append(encoding)
+            kbps = encoding.kbps
             row += f"{kbps:12.2f}"
             for peer, column in PEERS.items():
                 peer_points = peer_results.interpolate_kbps(measured[name][column], ERROR_COLUMNS[kind], error)
                 ratios.setdefault(f"{peer}_{key}", []).append(peer_points / kbps)
                 row += f"{peer_points / kbps:8.2f}" if peer == "acl" else f"{peer_points / kbps:9.2f}"
         print(row, flush=True)
+    rates = {goal: [encoding.kbps for encoding in of_clips] for goal, of_clips in encodings.items()}
     values_by_key = ratios | {f"kbps_{kind}_{error:g}mm": values for (kind, error), values in rates.items()}
     figures = {key: round(geometric_mean(values), 3) for key, values in values_by_key.items()}
+    for (kind, error), of_clips in encodings.items():
+        tails = summarise_tails(of_clips) | {
+            f"{peer}_worst_clip": min(ratios[f"{peer}_{kind}_{error:g}mm"]) for peer in PEERS
+        }
+        figures |= {f"{key}_{kind}_{error:g}mm": round(value, 3) for key, value in tails.items()}
+    figures |= measure_served_ladder(motions)
     if os.environ.get("PICTURE"):
         drawn = draw_chart(motions, measured, rates, options.block_seconds)
         Path(os.environ["PICTURE"]).write_text(drawn, encoding="utf-8", newline="\n")

@@ -44,7 +44,7 @@ def test_derivative_equals_a_finite_difference() -> None:
     pose = pose_with(np.zeros(3))
     slope = AxisSlope(np.zeros((30, 3)), np.zeros(30), np.zeros(30), np.zeros(30))
     error = BlockError(pose.points - truth, np.zeros((18, 30, 3)), np.ones((23, 30)))
-    rate_distortion._rotation_axes(chain, joint, axis, pose, slope.axes)
+    rate_distortion.rotation_axes(chain, joint, axis, pose, slope.axes)
     rate_distortion._error_derivatives(joint, pose.points, error, slope)
     delta = 1e-5
     above, below = (

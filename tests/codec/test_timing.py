@@ -23,6 +23,20 @@ def test_blocks_cover_the_track_and_are_found_by_time(
     assert timing.block_at(timing.duration_us * 2) == timing.block_count - 1
 
 
+@given(st.floats(20, 200), st.integers(1, 5000), st.floats(0.1, 0.5))
+def test_short_first_block_adds_no_block(fps: float, frames: int, first: float) -> None:
+    timing = plan_timing(fps, frames, first_seconds=first)
+    assert timing.block_count <= max(1, round(frames / fps))
+    assert timing.first_frames <= timing.block_frames
+    assert timing.block_frames <= 2.5 * fps + 1
+
+
+def test_first_block_of_half_a_second_is_followed_by_even_blocks() -> None:
+    assert plan_timing(30.0, 300, first_seconds=0.5) == Timing(30.0, 300, 32, 15)
+    assert plan_timing(30.0, 72, first_seconds=0.5) == Timing(30.0, 72, 57, 15)
+    assert plan_timing(30.0, 42, first_seconds=0.5) == Timing(30.0, 42, 42, 42)
+
+
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [

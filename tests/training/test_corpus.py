@@ -31,6 +31,21 @@ def test_clips_without_a_licence_are_excluded(tmp_path: Path) -> None:
     assert corpus.licensed_clips(tmp_path) == {"a"}
 
 
+def test_performers_have_only_licensed_clips(tmp_path: Path) -> None:
+    (tmp_path / "CORPUS.csv").write_text(
+        "clip,licence_as_stated,family\na,MIT,x\nb,,x\nc,MIT,y\nd,MIT,x\n", encoding="utf-8"
+    )
+    assert corpus.read_performers(tmp_path) == {"x": ["a", "d"], "y": ["c"]}
+
+
+def test_reduced_frame_rate_keeps_the_duration() -> None:
+    motion = random_motion(1.0, 120.0, 3)
+    reduced = corpus.reduce_frame_rate(motion, 4)
+    assert reduced.fps == 30
+    assert reduced.duration == pytest.approx(motion.duration)
+    np.testing.assert_array_equal(reduced.root[3], motion.root[12])
+
+
 def test_families_and_empty_folder(tmp_path: Path) -> None:
     assert [corpus.clip_family(name) for name in ("perfume_A", "isaac_01_01", "mass_cart", "13_07")] == [
         "perfume",

@@ -73,3 +73,20 @@ def test_training_lowers_the_loss() -> None:
     for name, array in network.quantise_prior(after, labels)._asdict().items():
         assert array.shape == getattr(SHAPES, name)
     assert load_shipped_prior().hazard.shape == SHAPES.hazard
+
+
+def test_parameters_of_a_prior_are_those_it_was_quantised_from() -> None:
+    shipped = load_shipped_prior()
+    quantised = network.quantise_prior(network.to_parameters(shipped), np.zeros((0, 5), dtype=np.int32))
+    for name in set(shipped._fields) - {"sign"}:
+        np.testing.assert_array_equal(getattr(quantised, name), getattr(shipped, name), err_msg=name)
+
+
+def test_more_hidden_units_count_as_many_bits_while_they_are_off() -> None:
+    features, labels = random_examples(300)
+    bits = []
+    for hidden_units in (8, 24):
+        parameters = network.initial_parameters(hidden_units=hidden_units)
+        parameters[5][:] = 0
+        bits.append(network.count_magnitude_bits(features, labels, parameters))
+    assert bits[0] == bits[1] > 0

@@ -16,6 +16,7 @@ from bunraku.codec.channel_layout import MOTION_LAYOUT
 from bunraku.codec.coefficients import BlockHeader
 from bunraku.codec.motion_track import MotionTrack, step_size
 from bunraku.codec.prior import IntArray, Prior
+from bunraku.codec.step_search import MAX_STEP, MIN_STEP, StepSearch
 from bunraku.kernels import load_kernels
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
@@ -24,7 +25,6 @@ from bunraku.motion.skeleton import JOINT_COUNT, PARENTS, TIP_JOINTS, Motion, jo
 EncodingGrade = Literal["live", "best"]
 """Effort of the encoder: `live` makes a single pass and accepts a step quickly, `best` refines and searches."""
 
-MIN_STEP, MAX_STEP = 0, 255
 POINT_COUNT = JOINT_COUNT + len(TIP_JOINTS)
 """Joints and tips at which errors are measured."""
 MEAN_ERROR_REFINEMENT = Refinement(max_sweeps=5, bit_price=0.35)
@@ -34,11 +34,8 @@ _MEAN_ERROR_BIT_PRICES = 0.28, 0.45
 """Bit prices of the candidates for a mean error: on both sides of the price of the step search."""
 _STEP_SEARCH_RADIUS = 6
 """Range of step indices, up and down, among the blocks of one mean error."""
-_ERROR_BOUND_SWEEPS = 8
+_ERROR_BOUND_SWEEPS = 7
 _ERROR_BOUND_BIT_PRICE = 0.6
-_LIVE_MIN_ERROR_SHARE = 0.6
-"""The `live` grade accepts a block whose largest error is at least this share of the bound."""
-_BOUND_MARGIN = 1 - 1e-6
 _STILL_TOLERANCE = 2.0**-13
 """Difference of quaternions up to which joints have their references: that of two still frames, and of rounding."""
 
@@ -119,7 +116,10 @@ class BlockEncoder:
         q: IntArray = np.zeros((19, 3, frames), dtype=np.int64)
         decoded = kernels.quantise_closed_loop(block, q)
         if refinement is not None:
-            decoded = kernels.refine_coefficients(block, q, refinement)
+            if refinement.error_bound_m > 0:
+                decoded = kernels.refine_within_bound(block, q, refinement)
+            else:
+                decoded = kernels.refine_coefficients(block, q, refinement)
         if self._is_still:
             # the joints' references are the pose itself: joints that correct the root's error cost more than they gain
             q[2:] = 0
@@ -136,46 +136,16 @@ class BlockEncoder:
         The search starts at `initial_step`, if given. Raises ValueError if the finest step does not meet the bound.
         """
         refinement = None if grade == "live" else error_bound_refinement(error_bound_mm)
-        candidates: dict[int, EncodedBlock] = {}
-
-        def meets_bound(step: int) -> bool:
-            if step not in candidates:
-                candidates[step] = self.encode_block(index, step, refinement)
-            return bool(candidates[step].errors_mm.max() <= error_bound_mm * _BOUND_MARGIN)
-
+        search = StepSearch(partial(self.encode_block, index, refinement=refinement), error_bound_mm)
         step = (
             initial_step
             if initial_step is not None
             else int(np.clip(16 * np.log2(error_bound_mm * 2e-4 / 2.0**-16), MIN_STEP, MAX_STEP))
         )
-        coarsest_valid = step if meets_bound(step) else None
-        for _ in range(6 if grade == "best" else 1):
-            max_error = max(float(candidates[step].errors_mm.max()), 1e-9)
-            if grade == "live" and _LIVE_MIN_ERROR_SHARE * error_bound_mm < max_error <= error_bound_mm:
-                break
-            move = int(np.clip(np.round(16 * np.log2(error_bound_mm * 0.97 / max_error)), -48, 48))
-            if coarsest_valid is not None and abs(move) <= 1:
-                break
-            step = int(np.clip(step + (move or (-1 if coarsest_valid is None else 1)), MIN_STEP, MAX_STEP))
-            if step in candidates:
-                break
-            if meets_bound(step):
-                coarsest_valid = step if coarsest_valid is None else max(coarsest_valid, step)
-        step = min(candidates)
-        while coarsest_valid is None:
-            if step == MIN_STEP:
-                raise ValueError(
-                    f"Block {index} cannot be encoded within {error_bound_mm} mm, even at the finest step."
-                )
-            step = max(step - 4, MIN_STEP)
-            coarsest_valid = step if meets_bound(step) else None
-        if grade == "best":
-            for coarser in (2, 4, 6):
-                if coarsest_valid + coarser <= MAX_STEP:
-                    meets_bound(coarsest_valid + coarser)
-        return min(
-            (block for step, block in candidates.items() if meets_bound(step)), key=lambda block: len(block.data)
-        )
+        found = search.find_valid(step) if grade == "live" else search.find_cheapest(step)
+        if found is None:
+            raise ValueError(f"Block {index} cannot be encoded within {error_bound_mm} mm, even at the finest step.")
+        return found
 
     def encode_to_mean_error(self, mean_error_mm: float) -> list[EncodedBlock]:
         """Encode all blocks with a mean error over the motion of at most, and close to, `mean_error_mm`.

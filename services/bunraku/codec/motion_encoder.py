@@ -27,6 +27,8 @@ They range from about 1 kbit/s to a quality that is indistinguishable from the s
 
 _MEAN_TO_MAX_ERROR_RATIO = 0.3
 """Typical mean error as a share of the largest."""
+_GRID_ERROR_MM = 0.5
+"""Largest error below which the grid of the figure gets finer: at this bound, 0.2 mm costs less than 0.1 mm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +100,9 @@ def encode_motion(
     Raises:
         ValueError: The finest step does not meet a bound.
     """
-    track = plan_motion_track(motion, block_seconds, first_seconds, min(error_bounds_mm) * _MEAN_TO_MAX_ERROR_RATIO)
+    finest = min(error_bounds_mm)
+    grid_error_mm = max(finest * _MEAN_TO_MAX_ERROR_RATIO, min(finest, _GRID_ERROR_MM))
+    track = plan_motion_track(motion, block_seconds, first_seconds, grid_error_mm)
     encoder = BlockEncoder(track, motion, prior or load_shipped_prior())
     finished = count(1)
 

@@ -107,10 +107,7 @@ def describe_motion_track(track: MotionTrack, rates: list[dict[str, float]]) -> 
         "type": "motion",
         "codec": MOTION_CODEC,
         "channels": CHANNEL_COUNT,
-        "fps": track.fps,
-        "frames": track.frames,
-        "block_frames": track.block_frames,
-        "first_frames": track.first_frames,
+        **track.describe_timing(),
         "rates": rates,
         "dancer": track.skeleton.pack(),
     }

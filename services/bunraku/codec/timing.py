@@ -59,12 +59,27 @@ class Timing:
         index = int((frame - self.first_frames) // self.block_frames) + 1 if frame >= self.first_frames else 0
         return min(max(index, 0), self.block_count - 1)
 
+    def describe_timing(self) -> dict[str, float]:
+        """Return what `parse_timing` reads of an entry of a Description's `tracks` (proto/messages.md, 3.2)."""
+        return {
+            "fps": self.fps,
+            "frames": self.frames,
+            "block_frames": self.block_frames,
+            "first_frames": self.first_frames,
+        }
+
 
 def plan_timing(fps: float, frames: int, block_seconds: float = 1.0, first_seconds: float | None = None) -> Timing:
-    """Divide `frames` frames into even blocks of about `block_seconds`, the first of `first_seconds` if given."""
-    first = 0 if first_seconds is None else min(max(1, round(first_seconds * fps)), frames, MAX_BLOCK_FRAMES)
-    parts = max(1, round((frames - first) / (block_seconds * fps)))
-    block_frames = min(max(1, -(-(frames - first) // parts)), MAX_BLOCK_FRAMES)
+    """Divide `frames` frames into even blocks of about `block_seconds`, the first of `first_seconds` if given.
+
+    A different first block adds no block: the others are up to twice as long instead, and a single block stays one.
+    """
+    count = max(1, round(frames / (block_seconds * fps)))
+    first = 0
+    if first_seconds is not None and count > 1:
+        first = min(max(1, round(first_seconds * fps)), frames, MAX_BLOCK_FRAMES)
+        count -= 1
+    block_frames = min(max(1, -(-(frames - first) // count)), MAX_BLOCK_FRAMES)
     return Timing(fps, frames, block_frames, first or min(block_frames, frames))
 
 

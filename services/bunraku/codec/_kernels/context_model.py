@@ -149,6 +149,7 @@ def predict_scale(context: ContextModel, channel: int, axis: int, k: int) -> int
             x += f[i] * prior.hidden[unit, i]
         if x > 0:
             scale += (min(x >> 8, 32767) * prior.out[unit, frequency_class]) >> 12
+    scale += context.layout.scale_offsets[channel, axis]
     return min(max(scale, MIN_SCALE), MAX_SCALE)  # type: ignore[no-any-return]
 
 

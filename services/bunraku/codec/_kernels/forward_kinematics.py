@@ -106,6 +106,8 @@ def evaluate_channel(chain: KinematicChain, quantiser: Quantiser, q: IntArray, c
     values = np.zeros((basis.shape[1], 3))
     weighted, coefficient = np.zeros(3), np.zeros(3)
     for k in range(basis.shape[0]):
+        if q[channel, 0, k] == 0 and q[channel, 1, k] == 0 and q[channel, 2, k] == 0:
+            continue
         for axis in range(3):
             weighted[axis] = reconstruct(q[channel, axis, k]) * quantiser.step_size
         apply_matrix(inverse_weight, weighted, coefficient)

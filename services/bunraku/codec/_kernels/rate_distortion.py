@@ -86,7 +86,7 @@ class Sweep(NamedTuple):
 
 
 @njit(cache=True, fastmath=True)
-def _rotation_axes(chain: KinematicChain, joint: int, axis: int, pose: Pose, out: Array) -> None:
+def rotation_axes(chain: KinematicChain, joint: int, axis: int, pose: Pose, out: Array) -> None:
     """Compute the world rotation (n, 3) of a joint by unit of one of its weighted values."""
     unit = chain.inverse_weight[joint + 1][:, axis]
     vectors, orientation = pose.vectors[joint], pose.orientation
@@ -289,12 +289,12 @@ def _count_used_frequencies(q: IntArray) -> int:
 
 
 @njit(cache=True)
-def _start_sweep(block: BlockInput, q: IntArray, bit_price: float) -> Sweep:
+def start_sweep(block: BlockInput, q: IntArray, bit_price: float, extra_frequencies: int = 0) -> Sweep:
     """Return a sweep whose context model contains the levels of all current coefficients.
 
     A channel that is coded later therefore counts as it was before the sweep.
     """
-    used = _count_used_frequencies(q)
+    used = min(_count_used_frequencies(q) + extra_frequencies, q.shape[2])
     context = create_context_model(block.prior, block.layout, used, block.quantiser.step, block.duration_level)
     for channel in range(19):
         for k in range(used):
@@ -305,14 +305,21 @@ def _start_sweep(block: BlockInput, q: IntArray, bit_price: float) -> Sweep:
 
 
 @njit(cache=True)
-def _sweep_channel(sweep: Sweep, q: IntArray, channel: int, pose: Pose, error: BlockError, slope: AxisSlope) -> None:
-    """Optimise the three axes of one channel and keep the errors up to date."""
-    context, chain = sweep.context, sweep.block.chain
+def start_channel(sweep: Sweep, channel: int) -> None:
+    """Compute the sums that the axes of a channel share at each frequency."""
+    context = sweep.context
     for k in range(context.frequencies):
         finish_frequency(context, channel, k)
     for k in range(context.frequencies):
         compute_shared_sums(context, channel, k)
         sweep.shared_sums[k] = context.shared_sums
+
+
+@njit(cache=True)
+def _sweep_channel(sweep: Sweep, q: IntArray, channel: int, pose: Pose, error: BlockError, slope: AxisSlope) -> None:
+    """Optimise the three axes of one channel and keep the errors up to date."""
+    context, chain = sweep.context, sweep.block.chain
+    start_channel(sweep, channel)
     for axis in range(3):
         if channel == 0:
             scale = chain.inverse_weight[0][axis, axis]
@@ -322,7 +329,7 @@ def _sweep_channel(sweep: Sweep, q: IntArray, channel: int, pose: Pose, error: B
                     for t in range(len(slope.change)):
                         error.position[point, t, axis] += slope.change[t] * scale
         else:
-            _rotation_axes(chain, channel - 1, axis, pose, slope.axes)
+            rotation_axes(chain, channel - 1, axis, pose, slope.axes)
             _error_derivatives(channel - 1, pose.points, error, slope)
             if _sweep_axis(sweep, q, channel, axis, slope):
                 _apply_change(channel - 1, pose.points, error, slope)
@@ -347,7 +354,7 @@ def refine_coefficients(block: BlockInput, q: IntArray, refinement: Refinement) 
             if number >= _MIN_SWEEPS and (ratio <= 1 or ratio > _UNREACHABLE_ERROR_RATIO):
                 return pose.points
             _update_weights(error, number >= _MIN_SWEEPS)
-        sweep = _start_sweep(block, q, refinement.bit_price)
+        sweep = start_sweep(block, q, refinement.bit_price)
         for channel in range(19):
             _sweep_channel(sweep, q, channel, pose, error, slope)
     compute_pose(block.chain, block.quantiser, q, pose)
