@@ -59,7 +59,8 @@ def test_packet_is_in_the_block_in_which_it_starts(timing: Timing, share: float,
     assert [packet for _, packet in unpacked] == list(enumerate(packets))
     for index, packet in unpacked:
         start = track.first_sample(packet.number) * 1e6 / SAMPLE_RATE
-        assert index == 0 or timing.start_us(index) <= start + 1
+        # `block_at` allows a microsecond, and the start of a block is rounded to one
+        assert index == 0 or timing.start_us(index) <= start + 1.5
         assert index == timing.block_count - 1 or start < timing.start_us(index + 1)
     # the packets cover all samples, and none is superfluous
     assert track.first_sample(len(packets)) >= samples > track.first_sample(len(packets) - 1)

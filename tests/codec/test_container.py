@@ -3,6 +3,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import msgpack
+import numpy as np
 import pytest
 
 from bunraku.codec.audio import AudioTrack, EncodedAudio, create_audio_track, pack_audio_level, unpack_audio_block
@@ -16,8 +17,9 @@ from bunraku.codec.container import (
     unpack_motion,
 )
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import ExtensionTrack
+from bunraku.codec.extension.contact import ContactTrack, encode_contacts
+from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.track import ExtensionTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
@@ -29,6 +31,7 @@ from bunraku.wire.messages import Data, Description, unpack
 from tests.motion.extended_source import extended_source
 from tests.vectors.audio import random_packets
 from tests.vectors.blocks import random_motion
+from tests.vectors.hands_face import make_face, make_hands
 from tests.vectors.scene import sample_camera, sample_light
 
 ENCODED = encode_motion(random_motion(2.5, 30.0, 8), error_bounds_mm=(30.0, 5.0), grade="live")
@@ -194,6 +197,28 @@ def test_extension_comes_last_and_survives_other_changes() -> None:
     assert isinstance(lit.tracks[-1], ExtensionTrack)
     last = len(lit.tracks) - 1
     assert [data.block for data in data_messages(lit, last)] == [b for level in EXTENSION.ladder for b in level.blocks]
+
+
+def test_parts_of_all_performers_come_in_turn() -> None:
+    hands, face = make_hands(1, (3,) * 10, 60), make_face(2, ["aa", "blink"], 60)
+    others = [encode_extension(each, values, EXTENDED.track, [9.0, 1.5]) for each, values in (hands, face)]
+    stored = unpack_motion("a", pack_motion("a", EXTENDED, extensions=[EXTENSION, *others]))
+    joined, _ = add_performers("b", stored, [stored], [Placement(), Placement()])
+    extensions = [track for track in unpack_motion("b", joined).tracks if isinstance(track, ExtensionTrack)]
+    assert [(track.part, track.performer) for track in extensions] == [
+        (part, performer) for part in ("body", "fingers", "face") for performer in (0, 1)
+    ]
+
+
+def test_contacts_come_after_all_other_parts_and_belong_to_their_performers() -> None:
+    contacts = encode_contacts(np.ones((60, 2), dtype=bool), EXTENDED.track)
+    stored = unpack_motion("a", pack_motion("a", EXTENDED, extensions=[contacts, EXTENSION]))
+    assert [getattr(track, "part", None) for track in stored.tracks] == [None, "body", "contacts"]
+    joined, types = add_performers("b", stored, [stored], [Placement(), Placement()])
+    assert types == ["motion"] * 2 + ["extension"] * 4
+    tracks = unpack_motion("b", joined).tracks
+    assert [track.performer for track in tracks if isinstance(track, ContactTrack)] == [0, 1]
+    assert [data.block for data in data_messages(stored, 2)] == contacts.ladder[0].blocks
 
 
 def test_extensions_belong_to_their_performers() -> None:

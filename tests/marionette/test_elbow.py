@@ -111,3 +111,12 @@ def test_step_before_begin_raises_runtime_error() -> None:
     states = [elbow.has_begun]
     elbow.reset()
     assert [*states, elbow.has_begun] == [True, False]
+
+
+def test_preview_equals_the_next_step_and_has_no_effect() -> None:
+    rig = ArmRig(standard_figure(), Limb.LEFT_HAND)
+    elbow = Elbow(rig.arm, rig.shoulder)
+    elbow.begin((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), 0.3)
+    direction = vector.unit((0.5, 0.2, 0.6), (1.0, 0.0, 0.0))
+    previews = [elbow.preview(direction, 0.8, (0.0, 1.0, 0.0), 0.02) for _ in range(2)]
+    assert elbow.step(direction, 0.8, (0.0, 1.0, 0.0), 0.02) == previews[0] == previews[1]

@@ -96,3 +96,16 @@ def test_position_stays_between_min_and_max_distance(target: Vector, inner: floa
 def test_step_of_zero_duration_moves_nothing() -> None:
     follower = Follower((0.1, 0.2, 0.3), (1.0, 0.0, 0.0))
     assert follower.step(ZERO, 0.0, MAX_ACCELERATION) == (0.1, 0.2, 0.3)
+
+
+def test_follower_goes_on_from_where_it_was_moved_to() -> None:
+    follower = Follower(ZERO)
+    follower.step((0.5, 0.0, 0.0), FRAME_S, MAX_ACCELERATION)
+    follower.move_to((0.1, 0.0, 0.0), FRAME_S)
+    follower.move_to((0.12, 0.0, 0.0), FRAME_S)
+    before = follower.velocity
+    assert abs(before[0] - 0.02 / FRAME_S) < 1e-12
+    follower.move_to((0.12, 0.0, 0.0), 0.0)
+    assert follower.velocity == before
+    follower.step((0.5, 0.0, 0.0), FRAME_S, MAX_ACCELERATION)
+    assert velocity_change(follower, before) <= MAX_ACCELERATION * (1.0 + 1e-9)

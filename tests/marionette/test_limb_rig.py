@@ -147,3 +147,13 @@ def test_thigh_lifted_over_the_top_stays_at_its_limit() -> None:
         angles.append(angle)
     assert max(angles) == constants.MAX_THIGH_ANGLE_RAD == angles[-1]
     assert np.abs(np.diff(angles)).max() < 0.05
+
+
+def test_shoulder_frame_is_that_of_the_forward_kinematics() -> None:
+    root, pose = np.array([[0.3, 0.9, -0.2]]), POSES[7]
+    positions = skeleton.joint_and_tip_positions(FIGURE, root, pose[None])[0]
+    for limb, rig in HANDS.items():
+        position, turn = rig.shoulder_frame((0.3, 0.9, -0.2), pose.tolist())
+        np.testing.assert_allclose(position, positions[limb.joint_indices[0]], atol=1e-12)
+        chest = rotation.multiply(pose[0], pose[JOINT_INDEX["vl5"]])
+        np.testing.assert_allclose(turn, chest, atol=1e-12)

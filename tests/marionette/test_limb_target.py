@@ -154,3 +154,22 @@ def test_non_finite_values_raise_value_error(invalid: float, kind: InputKind) ->
     with pytest.raises(ValueError, match="finite"):
         add_input(target, kind, (0.0, invalid, 0.0), 1, 0, 0)
     assert target.value_at(100_000) == START
+
+
+def test_target_that_follows_starts_the_next_input_from_its_place() -> None:
+    target = LimbTarget(is_hand=True, now=0)
+    assert target.input_age_us(5) is None
+    target.set_start((0.0, -0.5, 0.0))
+    target.add_input(InputKind.VELOCITY, (1.0, 0.0, 0.0), 1, 0, 0)
+    assert target.input_age_us(1_000_000) == 0
+    target.add_input(InputKind.TARGET, (0.5, 0.0, 0.0), 2, 100_000, 100_000)
+    assert target.input_age_us(150_000) == 50_000
+    target.follow((0.0, 0.3, 0.3))
+    assert target.value_at(160_000) == (0.0, 0.3, 0.3)
+    for late in (1, 2):
+        with pytest.raises(LateInput):
+            target.add_input(InputKind.TARGET, (0.1, 0.1, 0.1), late, 170_000, 170_000)
+    target.add_input(InputKind.VELOCITY, (1.0, 0.0, 0.0), 3, 200_000, 200_000)
+    moved = target.value_at(300_000)
+    assert moved is not None
+    assert moved == pytest.approx((0.1, 0.3, 0.3))

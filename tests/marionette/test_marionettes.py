@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from bunraku.marionette.marionettes import Marionettes
@@ -11,6 +12,7 @@ from tests.marionette.fixtures import random_motion
 
 FIGURE = standard_figure()
 FRAME_INTERVAL_US = 16_667
+ROOT = np.zeros(3)
 POSES = [random_motion(90, seed) for seed in (3, 4, 5)]
 
 
@@ -35,7 +37,7 @@ def test_marionettes_of_a_stage_are_independent() -> None:
             assert outcome == singles[performer].ownership.apply_input(
                 "ada", LimbInput(limb, 1, 1, frame, now, values), now
             )
-        overlay = marionettes.compute_overlay([poses[frame] for poses in POSES], now)
+        overlay = marionettes.compute_overlay([(ROOT, poses[frame]) for poses in POSES], now)
         assert set(overlay) == set(controlled)
         for number, (performer, _) in limbs.items():
             single_overlay = singles[performer].compute_overlay(POSES[performer][frame], now)
@@ -101,7 +103,7 @@ def control_hand_and_leg(marionettes: Marionettes, begin: int) -> list[dict[int,
             grants = {limb: expect_grant(ownership.claim(limb, "ada", now)) for limb in (0, 3)}
             ownership.ask(0, "bo", True, now)
             for before in (frame - 2, frame - 1):
-                marionettes.observe_poses([POSES[0][before % 160 % 90]], before * FRAME_INTERVAL_US)
+                marionettes.observe_poses([(ROOT, POSES[0][before % 160 % 90])], before * FRAME_INTERVAL_US)
         if 2 < phase < 30:
             for limb, grant in grants.items():
                 values = (0.01 * phase, 0.2, 0.4)
@@ -112,7 +114,7 @@ def control_hand_and_leg(marionettes: Marionettes, begin: int) -> list[dict[int,
         if 30 < phase < 50:
             ownership.keep_alive("bo", [0], now)
         ownership.expire(now)
-        shown.append(marionettes.compute_overlay([POSES[0][frame % 160 % 90]], now))
+        shown.append(marionettes.compute_overlay([(ROOT, POSES[0][frame % 160 % 90])], now))
     assert ownership.is_at_rest
     return shown
 

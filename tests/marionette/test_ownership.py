@@ -11,6 +11,7 @@ from bunraku.marionette.ownership import (
     InputOutcome,
     LimbGrant,
     LimbInput,
+    LimbPair,
     LimbRefusal,
     Ownership,
 )
@@ -180,3 +181,79 @@ def test_released_limb_has_a_target_until_it_is_cleared() -> None:
     assert ownership.target(Limb.LEFT_HAND) is not None
     ownership.clear_target(Limb.LEFT_HAND)
     assert ownership.target(Limb.LEFT_HAND) is None
+
+
+def bonded_ownership() -> Ownership:
+    ownership = Ownership(8)
+    ownership.claim(0, "ada", 0)
+    assert ownership.bond(5, 0, "ada", 0) is None
+    return ownership
+
+
+def ended_bonds(ownership: Ownership) -> list[tuple[LimbPair, str]]:
+    """Return the bonds that have ended, each of which ada held until then."""
+    ended = ownership.take_ended_bonds()
+    assert all(bond.holders == {"ada"} for bond, _ in ended)
+    return [(bond.limbs, reason) for bond, reason in ended]
+
+
+def test_bond_needs_hands_of_which_one_is_held_and_the_other_is_free() -> None:
+    ownership = Ownership(8)
+    ownership.claim(0, "ada", 0)
+    ownership.claim(4, "bo", 0)
+    refusals = {
+        (0, 0): "unknown",
+        (0, 12): "unknown",
+        (0, -1): "unknown",
+        (0, 6): "leg",
+        (1, 5): "owner",
+        (0, 4): "held",
+    }
+    assert {pair: ownership.bond(*pair, "ada", 0) for pair in refusals} == refusals
+    assert not ownership.bonds
+    assert ownership.bond(5, 0, "ada", 0) is None
+    assert ownership.bond(0, 5, "ada", 0) is None
+    assert ownership.bonds == ((0, 5),)
+    assert ownership.bond(0, 1, "ada", 0) == "bonded"
+    assert [ownership.is_bonded(limb) for limb in (0, 1, 5)] == [True, False, True]
+    assert ownership.holders()[5] is None
+    assert ownership.target(5) is not None
+
+
+def test_bonded_hand_that_is_led_can_be_claimed() -> None:
+    ownership = bonded_ownership()
+    assert ownership.claim(5, "bo", 0) == LimbGrant(5, 1)
+    assert ownership.bonds == ((0, 5),)
+
+
+def test_bond_ends_with_a_release_a_loss_and_on_request() -> None:
+    ownership = bonded_ownership()
+    ownership.release(0, "ada", 1, 10)
+    assert ended_bonds(ownership) == [((0, 5), "released")]
+    assert ended_bonds(ownership) == []
+    ownership = bonded_ownership()
+    ownership.expire(INPUT_TIMEOUT_US)
+    assert ended_bonds(ownership) == [((0, 5), "lost")]
+    ownership = bonded_ownership()
+    ownership.leave("ada", 10)
+    assert ended_bonds(ownership) == [((0, 5), "lost")]
+    ownership = bonded_ownership()
+    ownership.set_limb_count(4)
+    assert ended_bonds(ownership) == [((0, 5), "lost")]
+    assert ownership.holders() == ("ada", None, None, None)
+    ownership = bonded_ownership()
+    assert not ownership.unbond(0, 5, "bo")
+    assert not ownership.unbond(0, 4, "ada")
+    assert ownership.unbond(5, 0, "ada")
+    assert ended_bonds(ownership) == [((0, 5), "released")]
+    assert ownership.holders()[0] == "ada"
+    assert ownership.bonds == ()
+
+
+def test_hands_of_four_performers_form_at_most_four_bonds() -> None:
+    ownership = Ownership(16)
+    for performer in range(4):
+        ownership.claim(4 * performer, "ada", 0)
+        assert ownership.bond(4 * performer, 4 * performer + 1, "ada", 0) is None
+    assert len(ownership.bonds) == 4
+    assert ownership.bond(0, 5, "ada", 0) == "bonded"

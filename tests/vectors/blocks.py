@@ -95,7 +95,7 @@ def make_vectors() -> dict[str, Any]:
     """Return tracks, blocks of several lengths and steps with coefficients and poses, and invalid blocks."""
     motion, fast_motion = random_motion(2.6, 30.0, 7), random_motion(1.1, 59.94, 8)
     even = replace(plan_motion_track(motion), block_frames=30, first_frames=30)
-    quick = plan_motion_track(fast_motion, 0.5, 0.1, mean_error_mm=2.0)
+    quick = plan_motion_track(fast_motion, 0.36, 0.1, mean_error_mm=2.0)
     still_rotations = np.repeat(motion.rotations[3:4], 20, axis=0)
     still_motion = Motion(standard_figure(), 24.0, motion.root[:20] * 0, still_rotations)
     still = plan_motion_track(still_motion)

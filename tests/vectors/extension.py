@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from bunraku.codec import coefficients
-from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import (
+from bunraku.codec.extension.body_joints import pack_body
+from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.track import (
     ExtensionTrack,
     decode_extension_block,
     describe_extension_track,
-    pack_extension,
     parse_extension_track,
 )
 from bunraku.codec.prior import load_shipped_prior
@@ -71,7 +71,7 @@ def pose_vectors(number: int, spine_count: int, neck_count: int) -> tuple[dict[s
         for index, frame in enumerate(frames)
     ]
     blocks = [to_base64(block) for level in encoded.ladder for block in level.blocks]
-    joints = to_base64(pack_extension(extension))
+    joints = to_base64(pack_body(extension))
     return encoded.describe() | {"joints": joints, "blocks": blocks, "names": list(extension.names)}, poses
 
 
@@ -85,7 +85,7 @@ def make_vectors() -> dict[str, Any]:
     made = [pose_vectors(number, *parts) for number, parts in enumerate(_PARTS)]
     tracks = [load_track(description) for description, _ in made]
     nominal = tracks[0].block_frames
-    joints = pack_extension(tracks[0].extension)
+    joints = tracks[0].pack_extension()
     described = describe_extension_track(tracks[0], made[0][0]["rates"]) | {"joints": to_base64(joints)}
     invalid = {
         "no frames": encode_header([(9, 8)], 0, scene=True),

@@ -1,4 +1,4 @@
-"""Generated files by path: golden vectors, AsyncAPI document, names of joints and TypeScript message types."""
+"""Generated files by path: golden vectors, AsyncAPI document, names in files and TypeScript message types."""
 
 from __future__ import annotations
 
@@ -12,8 +12,12 @@ from tests.vectors import (
     asyncapi,
     audio,
     blocks,
+    bonds,
+    contacts,
     controlled_limb,
     extension,
+    hand_face_names,
+    hands_face,
     joint_mapping,
     joint_names,
     live,
@@ -31,10 +35,13 @@ PROTO_FOLDER = ROOT / "proto"
 VECTORS_FOLDER = PROTO_FOLDER / "vectors"
 ASYNCAPI_FILE = PROTO_FOLDER / "asyncapi.json"
 JOINT_NAMES_FILE = PROTO_FOLDER / "joint_names.json"
+HAND_FACE_NAMES_FILE = PROTO_FOLDER / "hand_face_names.json"
 TYPESCRIPT_FILE = ROOT / "services" / "web" / "src" / "wire" / "messages.ts"
 GENERATORS: dict[str, Callable[[], Any]] = {
     "audio.json": audio.make_vectors,
     "blocks.json": blocks.make_vectors,
+    "bonds.json": bonds.make_vectors,
+    "hand_face_names.json": hand_face_names.make_vectors,
     "joint_mapping.json": joint_mapping.make_vectors,
     "live.json": live.make_vectors,
     "messages.json": messages.make_vectors,
@@ -42,7 +49,9 @@ GENERATORS: dict[str, Callable[[], Any]] = {
     "playback.json": playback.make_vectors,
     "pulled.json": controlled_limb.make_vectors,
     "scene.json": scene.make_vectors,
+    "contacts.json": contacts.make_vectors,
     "extension.json": extension.make_vectors,
+    "hands_face.json": hands_face.make_vectors,
     "skeletons.json": skeletons.make_vectors,
     "trace.json": trace.make_vectors,
 }
@@ -65,6 +74,11 @@ def render_joint_names() -> str:
     return json.dumps(joint_names.make_document(), indent=1, ensure_ascii=False) + "\n"
 
 
+def render_hand_face_names() -> str:
+    """Return the text of the words for fingers and expressions."""
+    return json.dumps(hand_face_names.make_document(), indent=1, ensure_ascii=False) + "\n"
+
+
 def render_typescript() -> str:
     """Return the text of the TypeScript message types."""
     return typescript.make_module(asyncapi.make_document())
@@ -76,5 +90,6 @@ def render_files() -> dict[Path, str]:
     return files | {
         ASYNCAPI_FILE: render_asyncapi(),
         JOINT_NAMES_FILE: render_joint_names(),
+        HAND_FACE_NAMES_FILE: render_hand_face_names(),
         TYPESCRIPT_FILE: render_typescript(),
     }

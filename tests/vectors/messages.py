@@ -18,6 +18,8 @@ from bunraku.wire.live import MAX_AGE_US, Live, LiveBlock, Sample
 from bunraku.wire.messages import (
     Alive,
     Ask,
+    Bond,
+    BondEnd,
     ChannelHeader,
     Choice,
     Claim,
@@ -155,6 +157,10 @@ def make_vectors() -> dict[str, Any]:
             ["a1", *[None] * 7],
             live=[{"performer": 0, "id": "p7", "name": "Aiko あ"}, {"performer": 1, "id": "p8", "name": "Ben"}],
         ),
+        Presence(1, [], ["a1", *[None] * 7], bonds=[[0, 5], [1, 4]]),
+        Bond([0, 5], True),
+        Bond([1, 0], False),
+        BondEnd([0, 5], "apart"),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     live = Live(NOW_US, 2, {0: LiveBlock(8_000, b"ab"), 1: LiveBlock(4_000, b"c")}).pack()
@@ -192,6 +198,9 @@ def make_vectors() -> dict[str, Any]:
         "bytes after the map": Claim(0).pack() + b"\0",
         "nil in place of a limb": bytes([67]) + msgpack.packb({"limb": None}),
         "a number in place of a boolean": bytes([71]) + msgpack.packb({"limb": 0, "wanted": 1}),
+        "a bond of one limb": bytes([73]) + msgpack.packb({"limbs": [0], "wanted": True}),
+        "a bond of three limbs": bytes([73]) + msgpack.packb({"limbs": [0, 1, 4], "wanted": True}),
+        "a bond with a limb past the last": bytes([73]) + msgpack.packb({"limbs": [0, 16], "wanted": True}),
         "binary in place of text": bytes([8]) + msgpack.packb({"title": b"a", "detail": "b"}),
         "fewer lists of asks than limbs": bytes([6])
         + msgpack.packb({"viewers": 0, "puppeteers": [], "limbs": [None] * 4, "asks": [[]] * 3}),

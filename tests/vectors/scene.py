@@ -66,7 +66,7 @@ def make_vectors() -> dict[str, Any]:
     still = SceneSamples("camera", 24.0, np.repeat(sample_camera(0.1, 24.0).values[:1], 30, axis=0))
     scenes = (
         encode_scene(sample_camera(2.6, 30.0), error_bounds_mm=(20.0, 1.0)),
-        encode_scene(sample_light(2.6, 59.94), 0.5, error_bounds_mm=(10.0,), first_seconds=0.1),
+        encode_scene(sample_light(2.6, 59.94), 0.43, error_bounds_mm=(10.0,), first_seconds=0.1),
         encode_scene(still, error_bounds_mm=(1.0,)),
     )
     tracks = [scene.track for scene in scenes]

@@ -8,7 +8,7 @@ import pytest
 
 from bunraku.codec import coefficients
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_track import decode_extension_block
+from bunraku.codec.extension.track import decode_extension_block
 from bunraku.codec.prior import load_shipped_prior
 from bunraku.motion.extension import extend_pose
 from bunraku.motion.skeleton import Figure, world_transforms

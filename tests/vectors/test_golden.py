@@ -47,6 +47,11 @@ def test_asyncapi_document_matches_the_declarations() -> None:
     assert golden.ASYNCAPI_FILE.read_text(encoding="utf-8") == golden.render_asyncapi(), "run `make vectors`"
 
 
+def test_names_of_fingers_and_expressions_match_the_readers() -> None:
+    text = golden.HAND_FACE_NAMES_FILE.read_text(encoding="utf-8")
+    assert text == golden.render_hand_face_names(), "run `make vectors`"
+
+
 def test_joint_names_match_the_profiles() -> None:
     assert golden.JOINT_NAMES_FILE.read_text(encoding="utf-8") == golden.render_joint_names(), "run `make vectors`"
 

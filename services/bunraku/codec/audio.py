@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.leb128 import decode_leb128, encode_leb128
 from bunraku.codec.timing import MAX_DURATION_US, Timing
 
 AUDIO_CODEC = "bunraku.audio/1"
@@ -122,9 +123,9 @@ def pack_audio_block(first_number: int, packets: Sequence[bytes]) -> bytes:
     """
     if not packets:
         return b""
-    parts = [_encode_leb128(first_number)]
+    parts = [encode_leb128(first_number)]
     for packet in packets:
-        parts += (_encode_leb128(len(packet)), packet)
+        parts += (encode_leb128(len(packet)), packet)
     block = b"".join(parts)
     unpack_audio_block(block)
     return block
@@ -166,10 +167,10 @@ def unpack_audio_block(data: bytes) -> list[AudioPacket]:
         raise DamagedBlock(f"Invalid audio block: {len(data)} bytes, at most {MAX_BLOCK_BYTES} are allowed.")
     if not data:
         return []
-    number, offset = _decode_leb128(data, 0)
+    number, offset = decode_leb128(data, 0)
     packets: list[AudioPacket] = []
     while offset < len(data):
-        length, offset = _decode_leb128(data, offset)
+        length, offset = decode_leb128(data, offset)
         packet = data[offset : offset + length]
         if length == 0 or len(packet) < length:
             raise DamagedBlock(f"Invalid audio block: packet {number} has {len(packet)} of {length} bytes.")
@@ -231,24 +232,3 @@ def parse_audio_track(description: dict[str, Any], motion: Timing) -> AudioTrack
 
 def _is_level(entry: Any) -> bool:
     return isinstance(entry, dict) and isinstance(entry.get("kbps"), float | int)
-
-
-def _encode_leb128(value: int) -> bytes:
-    low = []
-    while value >> 7:
-        low.append(value & 127 | 128)
-        value >>= 7
-    return bytes([*low, value])
-
-
-def _decode_leb128(data: bytes, offset: int) -> tuple[int, int]:
-    """Return an integer of 1 to 4 bytes and the offset after it. Raises `DamagedBlock`."""
-    value = 0
-    for shift in (0, 7, 14, 21):
-        if offset == len(data):
-            break
-        byte, offset = data[offset], offset + 1
-        value |= (byte & 127) << shift
-        if byte < 128:
-            return value, offset
-    raise DamagedBlock("Invalid audio block: an integer must have 1 to 4 bytes.")

@@ -20,13 +20,15 @@ class ChannelLayout(NamedTuple):
     """Channels of a block, in the order in which they are coded.
 
     `prior_channels` (C,) are the channels whose biases the prior applies, `relatives` (3, C) each channel's parent,
-    mirror and grandparent among the earlier channels, or NONE, and `axes` (C,) how many axes are coded. The block of a
-    layout with a `heading` has one in its header, and may have only the root's two channels.
+    mirror and grandparent among the earlier channels, or NONE, and `axes` (C,) how many axes are coded. `scale_offsets`
+    (C, 3) are added to the predicted scales, log2 in 1/256. The block of a layout with a `heading` has one in its
+    header, and may have only the root's two channels.
     """
 
     prior_channels: IntArray
     relatives: IntArray
     axes: IntArray
+    scale_offsets: IntArray
     heading: bool = False
 
 
@@ -36,13 +38,15 @@ def create_layout(
     mirrors: Sequence[int],
     axes: Sequence[int] | None = None,
     heading: bool = False,
+    scale_offsets: IntArray | None = None,
 ) -> ChannelLayout:
-    """Return the layout of channels with these parents and mirrors; `axes` is three each by default."""
+    """Return the layout of channels with these parents and mirrors; by default, of three axes without offsets."""
     grandparents = [parents[parent] if parent >= 0 else NONE for parent in parents]
     return ChannelLayout(
         np.array(prior_channels, dtype=np.int64),
         np.array([parents, mirrors, grandparents], dtype=np.int64),
         np.array(axes or [3] * len(parents), dtype=np.int64),
+        np.zeros((len(parents), 3), dtype=np.int64) if scale_offsets is None else scale_offsets,
         heading,
     )
 

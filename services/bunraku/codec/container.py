@@ -13,8 +13,9 @@ from typing import Any, NamedTuple, Protocol
 import msgpack
 
 from bunraku.codec.audio import AudioTrack, EncodedAudio, parse_audio_track
-from bunraku.codec.extension_encoder import EncodedExtension
-from bunraku.codec.extension_track import EXTENSION_TYPE, ExtensionTrack, parse_extension_track
+from bunraku.codec.extension.contact import ContactTrack, EncodedContacts, parse_contact_track
+from bunraku.codec.extension.encoder import EncodedExtension
+from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, ExtensionTrack, parse_extension_track
 from bunraku.codec.motion_encoder import EncodedMotion
 from bunraku.codec.motion_track import MotionTrack, parse_motion_track
 from bunraku.codec.scene import SceneTrack, parse_scene_track
@@ -26,7 +27,7 @@ from bunraku.wire.messages import Data, Description
 MAX_TRACKS = 16
 """Limit of the tracks of a motion: a Data message has four bits for the track."""
 
-Track = MotionTrack | SceneTrack | AudioTrack | ExtensionTrack
+Track = MotionTrack | SceneTrack | AudioTrack | ExtensionTrack | ContactTrack
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +111,7 @@ def pack_motion(
     encoded: EncodedMotion,
     scenes: Sequence[EncodedScene] = (),
     others: Sequence[EncodedMotion] = (),
-    extensions: Sequence[EncodedExtension] = (),
+    extensions: Sequence[EncodedExtension | EncodedContacts] = (),
     audio: EncodedAudio | None = None,
 ) -> bytes:
     """Return the object of a motion: performers (`encoded`, then `others`), cameras and lights, audio, extensions.
@@ -214,7 +215,8 @@ def _parse_other_track(description: dict[str, Any], first_track: MotionTrack) ->
     if description["type"] == "audio":
         return parse_audio_track(description, first_track)
     if description["type"] == EXTENSION_TYPE:
-        return parse_extension_track(description)
+        is_contacts = description.get("part") == ExtensionPart.CONTACTS
+        return parse_contact_track(description) if is_contacts else parse_extension_track(description)
     return parse_scene_track(description)
 
 
@@ -233,11 +235,11 @@ def _joined_extensions(motions: Sequence[StoredMotion]) -> list[_ObjectTrack]:
 def _pack_object(motion_id: str, tracks: Sequence[_ObjectTrack]) -> tuple[bytes, list[str]]:
     """Return an object and the types of its tracks. Raises ValueError for more than MAX_TRACKS tracks.
 
-    Extensions come last, as a stream without them describes only the tracks before; those without a number are left
-    out.
+    Extensions come last, part by part, as a stream without them describes only the tracks before; those without a
+    number are left out.
     """
     required = [track for track in tracks if track.type != EXTENSION_TYPE]
-    extensions = [track for track in tracks if track.type == EXTENSION_TYPE]
+    extensions = [track for part in ExtensionPart for track in tracks if track.description.get("part") == part.value]
     tracks = [*required, *extensions[: max(MAX_TRACKS - len(required), 0)]]
     if len(tracks) > MAX_TRACKS:
         raise ValueError(f"A motion has at most {MAX_TRACKS} tracks, this would have {len(tracks)}.")

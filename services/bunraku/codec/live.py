@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bunraku.codec.block_encoder import MAX_STEP, MIN_STEP, BlockEncoder
+from bunraku.codec.block_encoder import BlockEncoder
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.prior import load_shipped_prior
 from bunraku.codec.skeleton_description import SkeletonDescription
+from bunraku.codec.step_search import MAX_STEP, MIN_STEP
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion
 

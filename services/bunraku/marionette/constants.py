@@ -124,6 +124,24 @@ ARRIVAL_TOLERANCE = _float("arrival_tolerance_arm_lengths_or_rad")
 MIN_SOLVE_WEIGHT = _float("min_solve_weight")
 """Blend weight of a limb that is still returning although its blend is over."""
 
+# Bonds of two hands
+BOND_JOIN_ACCELERATION = _float("bond_join_acceleration_arm_lengths_per_s2")
+"""Acceleration with which two bonded hands approach each other."""
+BOND_BEGIN_ACCELERATION = _float("bond_begin_acceleration_arm_lengths_per_s2")
+"""Acceleration of the pair until its hands have met; with that of the hands less than `HAND_ACCELERATION`."""
+MAX_BOND_BEGIN_SPEED = _float("max_bond_begin_speed_arm_lengths_per_s")
+"""Speed at which the pair begins to move; the offsets of its hands take the rest of their velocity."""
+BOND_BORDER_MARGIN = _float("bond_border_margin_arm_lengths")
+"""Distance that a pair keeps from the border of the reach: on a fast way along it the pair may come nearer."""
+MAX_BOND_STRETCH = _float("max_bond_stretch_ratio")
+"""Distance of two shoulders, per sum of both reaches, beyond which a bond ends: the common reach shrinks to a point."""
+RECENCY_HALF_LIFE_S = _float("recency_half_life_s")
+"""Age of an input that halves the weight of its goal."""
+SHARE_HALF_LIFE_S = _float("share_half_life_s")
+"""Time in which the shown weight of a goal comes half as near to the present one."""
+MIN_SHARE = _float("min_share_ratio")
+"""Share of a bonded hand's goal below which the goal follows the pair."""
+
 # Controller input
 MAX_HAND_SPEED = _float("full_hand_speed_arm_lengths_per_s")
 """Speed of a hand along one axis at full deflection."""

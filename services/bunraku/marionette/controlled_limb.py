@@ -8,6 +8,7 @@ is a hand tip in the shoulder's frame in arm lengths, or a thigh angle in radian
 from __future__ import annotations
 
 from bunraku.marionette.blend import ArmBlend
+from bunraku.marionette.bond.bond import HandMotion
 from bunraku.marionette.constants import (
     ARRIVAL_TOLERANCE,
     HAND_ACCELERATION,
@@ -134,10 +135,37 @@ class ControlledHand(_ControlledLimb):
             hand = follower.step(own, seconds, acceleration, inner, 1.0, self._velocity)
             if weight <= 0.0 and vector.length(vector.subtract(hand, own)) < ARRIVAL_TOLERANCE:
                 return None
-        motion_joints = rig.pose_joints(pose)
+        return self._solve_at(pose, hand, weight, seconds)
+
+    def next_motion(self, seconds: float) -> HandMotion:
+        """Return where the hand is `seconds` after the last call of `solve_joints` if nothing moves it."""
+        if self._follower is None:
+            return HandMotion(self.motion_position, self._velocity)
+        velocity = self._follower.velocity
+        return HandMotion(vector.add(self._follower.position, vector.scale(velocity, seconds)), velocity)
+
+    def reachable_place(self, pose: Pose, place: Vector, seconds: float) -> Vector:
+        """Return the place next to `place` that the arm reaches in the next `seconds`, within the shoulder's limit."""
+        self._begin_elbow(pose)
+        direction = self.rig.target_direction(place)
+        return self._elbow.preview(direction, vector.length(place), self.rig.local_up(pose), seconds).tip
+
+    def solve_bonded_joints(self, pose: Pose, place: Vector, weight: float, seconds: float) -> JointRotations:
+        """Return the arm's joints as `solve_joints` does, with the hand moved to the place that its bond gives."""
+        self._return_acceleration = None
+        self._ensure_follower().move_to(place, seconds)
+        return self._solve_at(pose, place, weight, seconds)
+
+    def _begin_elbow(self, pose: Pose) -> None:
         if not self._elbow.has_begun:
-            elbow, chord = rig.joint_positions(motion_joints)[0], rig.target_direction(own)
-            self._elbow.begin(chord, rig.plane_normal(motion_joints), lift_angle(elbow, chord))
+            rig, joints = self.rig, self.rig.pose_joints(pose)
+            elbow, chord = rig.joint_positions(joints)[0], rig.target_direction(self.motion_position)
+            self._elbow.begin(chord, rig.plane_normal(joints), lift_angle(elbow, chord))
+
+    def _solve_at(self, pose: Pose, hand: Vector, weight: float, seconds: float) -> JointRotations:
+        rig, own = self.rig, self.motion_position
+        motion_joints = rig.pose_joints(pose)
+        self._begin_elbow(pose)
         tip, normal, bend = self._elbow.step(
             rig.target_direction(hand), vector.length(hand), rig.local_up(pose), seconds
         )

@@ -41,10 +41,20 @@ class Elbow:
 
         `up` is the world's up, a unit vector in the same frame. Raises RuntimeError before `begin`.
         """
+        configuration, self._state = self._advance(direction, reach, up, seconds)
+        return configuration
+
+    def preview(self, direction: Vector, reach: float, up: Vector, seconds: float) -> ArmConfiguration:
+        """Return what `step` would return, without effect."""
+        return self._advance(direction, reach, up, seconds)[0]
+
+    def _advance(
+        self, direction: Vector, reach: float, up: Vector, seconds: float
+    ) -> tuple[ArmConfiguration, ElbowState]:
         if self._state is None:
             raise RuntimeError("step() needs a state: call begin() first")
         arm = self._arm
-        configuration, self._state = self.solver.step_elbow(
+        configuration, state = self.solver.step_elbow(
             arm.geometry, arm.bend_nodes, self._shoulder, self._state, direction, reach, up, seconds
         )
-        return ArmConfiguration(*configuration)
+        return ArmConfiguration(*configuration), state

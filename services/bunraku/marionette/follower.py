@@ -60,3 +60,10 @@ class Follower:
             max_distance,
         )
         return self.position
+
+    def move_to(self, position: Vector, seconds: float) -> None:
+        """Move to a position that was computed otherwise, in `seconds`; the next step begins with that velocity."""
+        if seconds > 0.0:
+            self.velocity = vector.scale(vector.subtract(position, self.position), 1.0 / seconds)
+        self.position = position
+        self._previous_target = self._previous_frame_velocity = None

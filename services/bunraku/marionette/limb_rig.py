@@ -85,6 +85,8 @@ class ArmRig:
         proportions = Proportions.from_links((upper, fore, hand))
         # the lengths are exactly the figure's; only the bend comes from the nearest table
         self.arm = Arm(proportions, load_bend_table(proportions.identity))
+        self._trunk = _bone_offset(figure, JOINT_INDEX["vl5"])
+        self._shoulder_offset = _bone_offset(figure, self.joint_indices[0])
         first, second, third = self.bones
         self.rest_frames = (bone_frame(first, BEND_AXIS), bone_frame(second, BEND_AXIS), bone_frame(third, BEND_AXIS))
         self.shoulder = make_shoulder_limit(right=limb is Limb.RIGHT_HAND)
@@ -96,6 +98,13 @@ class ArmRig:
         """Return the world's up in the shoulder's frame."""
         chest = vector.multiply(joint_rotation(pose, 0), joint_rotation(pose, JOINT_INDEX["vl5"]))
         return vector.rotate(vector.conjugate(chest), UP)
+
+    def shoulder_frame(self, root: Vector, pose: Pose) -> tuple[Vector, Quaternion]:
+        """Return position and orientation of the shoulder's frame, for a pose with its root at `root` (metres)."""
+        whole = joint_rotation(pose, 0)
+        chest = vector.multiply(whole, joint_rotation(pose, JOINT_INDEX["vl5"]))
+        trunk = vector.add(root, vector.rotate(whole, self._trunk))
+        return vector.add(trunk, vector.rotate(chest, self._shoulder_offset)), chest
 
     def joint_positions(self, joints: JointRotations) -> tuple[Vector, Vector, Vector]:
         """Return elbow, wrist and tip relative to the shoulder, in metres on the axes of vl5."""

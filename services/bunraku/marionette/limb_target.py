@@ -62,6 +62,7 @@ class LimbTarget:
         self._is_hand = is_hand
         self._last_heard_us = now
         self._elapsed_us = 0
+        self._last_input_us: int | None = None
         self._min_delay_us: int | None = None
         self._last_dropped_sequence = -1
         self._samples: list[_Sample] = []
@@ -71,6 +72,12 @@ class LimbTarget:
     def last_heard_us(self) -> int:
         """Time of the last input or keep-alive for this limb."""
         return self._last_heard_us
+
+    def input_age_us(self, now: int) -> int | None:
+        """Return the time since the last input, 0 while one moves the limb, None before the first."""
+        if self._last_input_us is None:
+            return None
+        return 0 if self._segments[-1].velocity != ZERO else max(now - self._last_input_us, 0)
 
     def value_at(self, now: int) -> Vector | None:
         """Return the target at `now`."""
@@ -103,6 +110,7 @@ class LimbTarget:
         ):
             raise LateInput
         self.keep_alive(now)
+        self._last_input_us = now
         lag = now - sampled_us
         self._min_delay_us = lag if self._min_delay_us is None else min(self._min_delay_us, lag)
         sample_time_us = self._elapsed_us - min(lag - self._min_delay_us, HOLD_TIMEOUT_US)
@@ -117,6 +125,16 @@ class LimbTarget:
     def stop(self, now: int) -> None:
         """Freeze the target at its value at `now`."""
         self._segments = [_Segment(0, self.value_at(now), None, 0, ZERO)]
+        self._samples = []
+
+    def follow(self, value: Vector) -> None:
+        """Replace the target by the place to which another puppeteer has moved the limb; earlier inputs have no effect.
+
+        The next input starts from there.
+        """
+        if self._samples:
+            self._last_dropped_sequence = self._samples[-1].sequence
+        self._segments = [_Segment(0, value, None, 0, ZERO)]
         self._samples = []
 
     def _local_time_us(self, now: int) -> int:

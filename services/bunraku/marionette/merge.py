@@ -7,16 +7,19 @@ It reads no clock: `now` is clock time in integer µs and must not run backwards
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from bunraku.marionette.bond.bonded_arm import BondedArm
 from bunraku.marionette.controlled_limb import ControlledHand, ControlledLeg
 from bunraku.marionette.handover import Handover
 from bunraku.marionette.limb_rig import ALL_LIMBS, Limb, Pose
+from bunraku.marionette.limb_target import LimbTarget
 from bunraku.marionette.ownership import LIMBS_PER_PERFORMER, Ownership
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
-from bunraku.marionette.solver.vector import JointRotations
+from bunraku.marionette.solver.vector import JointRotations, Vector
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 
@@ -68,6 +71,7 @@ class Marionette:
         self._handovers = [Handover() for _ in Limb]
         self._last_step_us: int | None = None
         self._recent_poses: deque[tuple[Array, float]] = deque(maxlen=2)
+        self._frame: tuple[Pose, float] = ((), 0.0)
         self.set_figure(figure)
 
     def set_figure(self, figure: Figure) -> None:
@@ -116,33 +120,60 @@ class Marionette:
 
         Call it once for each shown pose, in order: limbs move by the time between calls.
         """
+        self.begin_frame(rotations, now)
+        return self.finish_frame(now, {})
+
+    def begin_frame(self, rotations: Array, now: int) -> None:
+        """Observe the motion's pose (18, 4) at clock time `now`; `finish_frame` must follow."""
         seconds = self._advance_clock(now)
-        controlled: list[Limb] = []
-        overlaid: list[JointRotations] = []
         pose: Pose = rotations.tolist()
+        self._frame = (pose, seconds)
         holders = self.ownership.holders()
-        for limb in ALL_LIMBS:
-            number = self._first_limb + limb
-            target, is_held = self.ownership.target(number), holders[number] is not None
-            if target is None:
-                continue
+        for limb, number, target in self._targets():
             handover, controlled_limb = self._handovers[limb], self._limbs[limb]
-            handover.advance(is_held, seconds)
+            handover.advance(holders[number] is not None or self.ownership.is_bonded(number), seconds)
             if not controlled_limb.is_controlled:
                 for earlier, step in self._recent_poses:
                     controlled_limb.observe_pose(earlier.tolist(), step)
             controlled_limb.observe_pose(pose, seconds)
             target.set_start(controlled_limb.position)
-            goal = target.value_at(now) if is_held else None
-            joints = controlled_limb.solve_joints(pose, goal, handover.weight, seconds)
+        self._recent_poses.append((rotations, seconds))
+
+    def finish_frame(self, now: int, bonded_places: Mapping[int, Vector]) -> JointOverlay | None:
+        """Return the overlay of the frame; `bonded_places` has the places of bonded hands by the limb's number."""
+        pose, seconds = self._frame
+        controlled: list[Limb] = []
+        overlaid: list[JointRotations] = []
+        holders = self.ownership.holders()
+        for limb, number, target in self._targets():
+            controlled_limb, weight = self._limbs[limb], self._handovers[limb].weight
+            joints: JointRotations | None
+            if (place := bonded_places.get(number)) is not None and isinstance(controlled_limb, ControlledHand):
+                joints = controlled_limb.solve_bonded_joints(pose, place, weight, seconds)
+            else:
+                goal = target.value_at(now) if holders[number] is not None else None
+                joints = controlled_limb.solve_joints(pose, goal, weight, seconds)
             if joints is None:
                 self.ownership.clear_target(number)
                 controlled_limb.reset()
                 continue
             controlled.append(limb)
             overlaid.append(joints)
-        self._recent_poses.append((rotations, seconds))
         return JointOverlay(tuple(controlled), tuple(overlaid)) if controlled else None
+
+    def bonded_arm(self, limb: int, root: Vector) -> BondedArm:
+        """Return the arm of a hand (by its number on the stage) in the frame that has begun, for its bond."""
+        pose, seconds = self._frame
+        hand = self._limbs[limb - self._first_limb]
+        assert isinstance(hand, ControlledHand)
+        return BondedArm(hand, pose, root, seconds)
+
+    def _targets(self) -> Iterator[tuple[Limb, int, LimbTarget]]:
+        """Yield each limb that is not the motion's alone, with its number on the stage and its target."""
+        for limb in ALL_LIMBS:
+            number = self._first_limb + limb
+            if (target := self.ownership.target(number)) is not None:
+                yield limb, number, target
 
     def _advance_clock(self, now: int) -> float:
         seconds = 0.0 if self._last_step_us is None else min(max(now - self._last_step_us, 0) * 1e-6, MAX_STEP_S)

@@ -62,6 +62,23 @@ class LimbInput:
     values: Vector
 
 
+LimbPair = tuple[int, int]
+"""Two bonded hands, the lower number first."""
+BondEndReason = Literal["released", "lost", "apart"]
+"""Why a bond ended: a hand was released, its holder was lost, or the shoulders are too far apart."""
+BondRefusal = Literal["unknown", "leg", "owner", "held", "bonded"]
+"""Why two limbs are not bonded: there is no such limb, one is a leg, the puppeteer holds neither, another puppeteer
+holds one, or one is in another bond."""
+
+
+@dataclass(frozen=True, slots=True)
+class EndedBond:
+    """Bond that has ended, and the puppeteers who held its hands until then."""
+
+    limbs: LimbPair
+    holders: frozenset[str]
+
+
 class InputOutcome(Enum):
     """Result of an input; the values are the labels of the metric and of notices."""
 
@@ -99,6 +116,8 @@ class Ownership:
         # of all limbs that a stage can have, so that a limb that is removed and added again never repeats an epoch
         self._epochs = [*epochs, *INITIAL_EPOCHS[len(epochs) :]]
         self._limbs: list[_LimbState] = []
+        self._bonds: list[LimbPair] = []
+        self._ended_bonds: list[tuple[EndedBond, BondEndReason]] = []
         self.wake_count = 0
         """Number of claims while all limbs were at rest."""
         self.set_limb_count(limb_count)
@@ -112,6 +131,8 @@ class Ownership:
         removed = [
             (limb, state.holder) for limb, state in enumerate(self._limbs) if limb >= count and state.holder is not None
         ]
+        for limb in range(count, len(self._limbs)):
+            self._end_bond_of(limb, "lost")
         current = len(self._limbs)
         self._limbs = [*self._limbs[:count], *(_LimbState(epoch=epoch) for epoch in self._epochs[current:count])]
         return removed
@@ -151,6 +172,7 @@ class Ownership:
         state = self._held_by(limb, puppeteer)
         if state is None or state.epoch != epoch:
             return False
+        self._end_bond_of(limb, "released")
         state.release(now)
         return True
 
@@ -158,10 +180,64 @@ class Ownership:
         """Free all limbs of a puppeteer, drop the puppeteer's requests, and return the freed limbs."""
         freed = tuple(limb for limb, state in enumerate(self._limbs) if state.holder == puppeteer)
         for limb in freed:
+            self._end_bond_of(limb, "lost")
             self._limbs[limb].release(now)
         for state in self._limbs:
             state.asks.pop(puppeteer, None)
         return freed
+
+    @property
+    def bonds(self) -> tuple[LimbPair, ...]:
+        """Bonded pairs, in the order in which they were bonded."""
+        return tuple(self._bonds)
+
+    def bond(self, first: int, second: int, puppeteer: str, now: int) -> BondRefusal | None:
+        """Bond two hands, of which the puppeteer holds one; the other is the puppeteer's own or free.
+
+        Returns the reason of a refusal. A hand that is free stays free: it is led, and can be claimed.
+        """
+        pair = _ordered(first, second)
+        if first == second or not (self._has_limb(first) and self._has_limb(second)):
+            return "unknown"
+        if not all(Limb(limb % LIMBS_PER_PERFORMER).is_hand for limb in pair):
+            return "leg"
+        holders = {self._limbs[limb].holder for limb in pair}
+        if puppeteer not in holders:
+            return "owner"
+        if holders - {puppeteer, None}:
+            return "held"
+        if pair in self._bonds:
+            return None
+        if any(limb in bond for limb in pair for bond in self._bonds):
+            return "bonded"
+        for limb in pair:
+            # a hand that is led differs from the motion until it is back
+            self._limbs[limb].target = self._limbs[limb].target or LimbTarget(is_hand=True, now=now)
+        self._bonds.append(pair)
+        return None
+
+    def unbond(self, first: int, second: int, puppeteer: str) -> bool:
+        """End a bond; return False, without effect, if there is none or the puppeteer holds neither hand."""
+        pair = _ordered(first, second)
+        if pair not in self._bonds or puppeteer not in {self._limbs[limb].holder for limb in pair}:
+            return False
+        self.end_bond(pair, "released")
+        return True
+
+    def end_bond(self, pair: LimbPair, reason: BondEndReason) -> None:
+        """End a bond; `take_ended_bonds` returns it with the reason."""
+        self._bonds.remove(pair)
+        holders = (self._limbs[limb].holder for limb in pair)
+        self._ended_bonds.append((EndedBond(pair, frozenset(filter(None, holders))), reason))
+
+    def take_ended_bonds(self) -> list[tuple[EndedBond, BondEndReason]]:
+        """Return the bonds that have ended since the last call, with the reasons."""
+        ended, self._ended_bonds = self._ended_bonds, []
+        return ended
+
+    def is_bonded(self, limb: int) -> bool:
+        """Return whether a limb is in a bond."""
+        return any(limb in pair for pair in self._bonds)
 
     def keep_alive(self, puppeteer: str, limbs: Iterable[int], now: int) -> None:
         """Record that the puppeteer still holds `limbs` without a new input; limbs of others are ignored."""
@@ -228,6 +304,7 @@ class Ownership:
         for limb, state in enumerate(self._limbs):
             if state.holder is not None and state.target and now - state.target.last_heard_us >= INPUT_TIMEOUT_US:
                 lost.append((limb, state.holder))
+                self._end_bond_of(limb, "lost")
                 state.release(now)
         return lost
 
@@ -247,6 +324,11 @@ class Ownership:
         state.target = LimbTarget(Limb(limb % LIMBS_PER_PERFORMER).is_hand, now)
         return LimbGrant(limb, state.epoch)
 
+    def _end_bond_of(self, limb: int, reason: BondEndReason) -> None:
+        for pair in self.bonds:
+            if limb in pair:
+                self.end_bond(pair, reason)
+
     def _has_limb(self, limb: int) -> bool:
         return 0 <= limb < len(self._limbs)
 
@@ -255,3 +337,7 @@ class Ownership:
             return None
         state = self._limbs[limb]
         return state if state.holder == puppeteer else None
+
+
+def _ordered(first: int, second: int) -> LimbPair:
+    return (first, second) if first < second else (second, first)

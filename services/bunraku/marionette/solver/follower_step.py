@@ -35,7 +35,7 @@ def advance(
     other parameters are those of `Follower.step`.
     """
     # the remaining path without the part that the target itself will move
-    direction, distance = _path_to(
+    direction, distance = path_to(
         position, vector.subtract(target, vector.scale(target_velocity, seconds)), min_distance
     )
     max_change = acceleration * seconds
@@ -53,7 +53,7 @@ def advance(
     return after, vector.scale(vector.subtract(after, position), 1.0 / seconds)
 
 
-def _path_to(position: Vector, target: Vector, min_distance: float) -> tuple[Vector, float]:
+def path_to(position: Vector, target: Vector, min_distance: float) -> tuple[Vector, float]:
     """Return the initial unit direction and the length of the path: straight, or past a point beside the origin."""
     straight = vector.subtract(target, position)
     distance = vector.length(straight)

@@ -6,6 +6,7 @@
  */
 
 import { DamagedBlock } from "./errors";
+import { Leb128Reader } from "./leb128";
 import { Timing, type TrackDescription } from "./timing";
 
 export const AUDIO_CODEC = "bunraku.audio/1";
@@ -111,26 +112,18 @@ export function unpackAudioBlock(data: Uint8Array): AudioPacket[] {
     throw new DamagedBlock(`Invalid audio block: ${data.length} bytes, at most ${MAX_BLOCK_BYTES} are allowed.`);
   const packets: AudioPacket[] = [];
   if (data.length === 0) return packets;
-  let offset = 0;
-  const readLeb128 = (): number => {
-    for (let value = 0, shift = 0; shift < 28 && offset < data.length; shift += 7) {
-      const byte = data[offset++];
-      value |= (byte & 127) << shift;
-      if (byte < 128) return value;
-    }
-    throw new DamagedBlock("Invalid audio block: an integer must have 1 to 4 bytes.");
-  };
-  let number = readLeb128();
-  for (; offset < data.length; number++) {
-    const length = readLeb128();
-    const packet = data.subarray(offset, offset + length);
+  const reader = new Leb128Reader(data);
+  let number = reader.read();
+  for (; reader.offset < data.length; number++) {
+    const length = reader.read();
+    const packet = data.subarray(reader.offset, reader.offset + length);
     if (length === 0 || packet.length < length) {
       throw new DamagedBlock(`Invalid audio block: packet ${number} has ${packet.length} of ${length} bytes.`);
     }
     const ms = packetDurationMs(packet);
     if (ms !== 60) throw new DamagedBlock(`Invalid audio block: packet ${number} lasts ${ms} ms, not 60.`);
     packets.push({ number, data: packet });
-    offset += length;
+    reader.offset += length;
   }
   if (packets.length === 0 || number > MAX_PACKETS) {
     throw new DamagedBlock("Invalid audio block: expected packets with numbers below 2^28, or no bytes at all.");

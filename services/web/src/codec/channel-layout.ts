@@ -16,17 +16,25 @@ export interface ChannelLayout {
   readonly grandparents: Uint8Array;
   /** Axes of each channel that are coded. */
   readonly axes: Uint8Array;
+  /** Added to the predicted scale of each axis [count][3], log2 in 1/256. */
+  readonly scaleOffsets: Int32Array;
   /** True if the header has a heading, and a bit that says whether only the root's two channels are coded. */
   readonly heading: boolean;
 }
 
-/** Return the layout of channels with these parents and mirrors, -1 for none; `axes` is three each by default. */
+/** Optional properties of a layout: by default all axes are coded, without offsets and heading. */
+interface LayoutOptions {
+  readonly axes?: readonly number[];
+  readonly scaleOffsets?: Int32Array;
+  readonly heading?: boolean;
+}
+
+/** Return the layout of channels with these parents and mirrors, -1 for none. */
 export function createLayout(
   priorChannels: readonly number[],
   parents: readonly number[],
   mirrors: readonly number[],
-  axes: readonly number[] = parents.map(() => 3),
-  heading = false,
+  { axes, scaleOffsets, heading = false }: LayoutOptions = {},
 ): ChannelLayout {
   const count = parents.length;
   const toIndices = (relatives: readonly number[]) =>
@@ -37,7 +45,8 @@ export function createLayout(
     parents: toIndices(parents),
     mirrors: toIndices(mirrors),
     grandparents: toIndices(parents.map((parent) => (parent === NONE ? NONE : parents[parent]))),
-    axes: Uint8Array.from(axes),
+    axes: Uint8Array.from(axes ?? parents.map(() => 3)),
+    scaleOffsets: scaleOffsets ?? new Int32Array(count * 3),
     heading,
   };
 }
@@ -52,9 +61,8 @@ export const MOTION_LAYOUT = createLayout(
   Array.from({ length: CHANNEL_COUNT }, (_, channel) => channel),
   [NONE, 0, ...PARENTS.slice(1).map((joint) => joint + 1)],
   [NONE, NONE, ...JOINT_MIRRORS.slice(1)],
-  undefined,
-  true,
+  { heading: true },
 );
 
 /** The seven values of a camera or light, in three channels. */
-export const SCENE_LAYOUT = createLayout([0, 1, 2], [NONE, 0, 1], [NONE, NONE, 1], [3, 3, 1]);
+export const SCENE_LAYOUT = createLayout([0, 1, 2], [NONE, 0, 1], [NONE, NONE, 1], { axes: [3, 3, 1] });

@@ -29,7 +29,10 @@ export interface BlockCoefficients {
   frames: number;
   /** Step index, 0..255. */
   step: number;
-  /** Rotation about y, in 1/64 of a turn, that the root's rotations are relative to, -32..31; 0 in other layouts than a motion's. */
+  /**
+   * Rotation about y, in 1/64 of a turn, that the root's rotations are relative to, -32..31; 0 in other layouts than a
+   * motion's.
+   */
   heading: number;
   /** Frequencies of each axis. */
   count: number;

@@ -142,7 +142,7 @@ export class ContextModel {
       weights,
       z * FEATURE_COUNT * SUM_COUNT,
     );
-    let scale = sums[0] >> 8;
+    let scale = (sums[0] >> 8) + layout.scaleOffsets[channel * 3 + axis];
     for (let unit = 0; unit < HIDDEN_UNITS; unit++) {
       const x = sums[1 + unit] >> 8;
       if (x > 0) scale += Math.imul(x < 32767 ? x : 32767, out[z * HIDDEN_UNITS + unit]) >> 12;

@@ -93,6 +93,23 @@ export const ARRIVAL_TOLERANCE = values.arrival_tolerance_arm_lengths_or_rad;
 /** Blend weight of a limb that is still returning although its blend is over. */
 export const MIN_SOLVE_WEIGHT = values.min_solve_weight;
 
+/** Acceleration with which two bonded hands approach each other. */
+export const BOND_JOIN_ACCELERATION = values.bond_join_acceleration_arm_lengths_per_s2;
+/** Acceleration of the pair until its hands have met; with that of the hands less than `HAND_ACCELERATION`. */
+export const BOND_BEGIN_ACCELERATION = values.bond_begin_acceleration_arm_lengths_per_s2;
+/** Speed at which the pair begins to move; the offsets of its hands take the rest of their velocity. */
+export const MAX_BOND_BEGIN_SPEED = values.max_bond_begin_speed_arm_lengths_per_s;
+/** Distance that a pair keeps from the border of the reach: on a fast way along it the pair may come nearer. */
+export const BOND_BORDER_MARGIN = values.bond_border_margin_arm_lengths;
+/** Distance of two shoulders, per sum of both reaches, beyond which a bond ends. */
+export const MAX_BOND_STRETCH = values.max_bond_stretch_ratio;
+/** Age of an input that halves the weight of its goal. */
+export const RECENCY_HALF_LIFE_S = values.recency_half_life_s;
+/** Time in which the shown weight of a goal comes half as near to the present one. */
+export const SHARE_HALF_LIFE_S = values.share_half_life_s;
+/** Share of a bonded hand's goal below which the goal follows the pair. */
+export const MIN_SHARE = values.min_share_ratio;
+
 /** Speed of a hand along one axis at full deflection. */
 export const MAX_HAND_SPEED = values.full_hand_speed_arm_lengths_per_s;
 /** Speed of a thigh at full deflection. */

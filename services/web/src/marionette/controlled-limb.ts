@@ -45,7 +45,7 @@ export abstract class ControlledLimb {
   /** Observe a pose of the motion, `seconds` after the last one. */
   observePose(rotations: Numbers, seconds: number): void {
     const { motionPosition: own, previousPosition: before, currentPosition: now, velocity } = this;
-    this.positionInPose(now, rotations);
+    this.placeInPose(now, rotations);
     before.set(this.hasPose ? own : now);
     this.previousVelocity.set(velocity);
     own.set(now);
@@ -61,7 +61,7 @@ export abstract class ControlledLimb {
 
   /** Start from another pose than the motion's, at rest. */
   startFrom(rotations: Numbers): void {
-    this.positionInPose(this.currentPosition, rotations);
+    this.placeInPose(this.currentPosition, rotations);
     this.follower = new Follower(this.currentPosition, ZERO_VELOCITY);
   }
 
@@ -80,7 +80,7 @@ export abstract class ControlledLimb {
   ): boolean;
 
   /** Write the position (3) of the limb in a pose. */
-  protected abstract positionInPose(out: Numbers, rotations: Numbers): void;
+  abstract placeInPose(out: Numbers, rotations: Numbers): void;
 
   /** Return the follower, which starts with the position and velocity of the motion a frame ago. */
   protected ensureFollower(): Follower {
@@ -190,7 +190,7 @@ export class ControlledHand extends ControlledLimb {
     return true;
   }
 
-  protected override positionInPose(out: Numbers, rotations: Numbers): void {
+  override placeInPose(out: Numbers, rotations: Numbers): void {
     this.rig.tipTarget(out, 0, rotations, 4 * this.rig.firstJointIndex);
   }
 }
@@ -235,7 +235,7 @@ export class ControlledLeg extends ControlledLimb {
     return true;
   }
 
-  protected override positionInPose(out: Numbers, rotations: Numbers): void {
+  override placeInPose(out: Numbers, rotations: Numbers): void {
     out[0] = this.rig.thighAngle(rotations, this.motionPosition[0]);
     out[1] = out[2] = 0;
   }

@@ -34,7 +34,6 @@ export class Follower {
   private readonly direction = new Float64Array(3);
   private readonly change = new Float64Array(3);
   private readonly before = new Float64Array(3);
-  private readonly aside = new Float64Array(3);
 
   /** Start at `position` (3) with `velocity` (3), which are copied. */
   constructor(position: Numbers, velocity: Numbers) {
@@ -75,7 +74,7 @@ export class Follower {
     if (frameVelocity) this.previousFrameVelocity.set(frameVelocity);
     // the remaining path without the part that the target itself will move
     addScaled(goal, 0, target, 0, ahead, 0, -seconds);
-    const distance = this.findPath(goal, minDistance);
+    const distance = pathTo(direction, position, goal, minDistance);
     const maxChange = acceleration * seconds;
     // the speed from which steps of the bounded acceleration stop after `distance`
     let speed = maxChange * (Math.sqrt(0.25 + (2 * distance) / (maxChange * seconds)) - 0.5);
@@ -94,41 +93,42 @@ export class Follower {
     clampDistance(position, minDistance, maxDistance);
     for (let i = 0; i < 3; i++) velocity[i] = (position[i] - before[i]) / seconds;
   }
+}
 
-  /**
-   * Return the length of the path to `target`, straight or past a point beside the origin, and write its initial
-   * direction.
-   */
-  private findPath(target: Numbers, minDistance: number): number {
-    const { position, direction, aside } = this;
-    addScaled(direction, 0, target, 0, position, 0, -1);
-    const distance = length(direction, 0);
-    if (distance < 1e-12) {
-      direction.fill(0);
-      return 0;
-    }
-    for (let i = 0; i < 3; i++) direction[i] /= distance;
-    if (minDistance <= 0) return distance;
-    const along = -dot(position, 0, direction, 0);
-    const near = Math.min(SHOULDER_CLEARANCE, length(position, 0), length(target, 0));
-    if (!(along > 0 && along < distance)) return distance;
-    // the point of the straight path nearest to the origin
-    addScaled(aside, 0, position, 0, direction, 0, along);
-    const off = length(aside, 0);
-    if (off >= near) return distance;
-    if (off > 1e-3) unit(aside, 0, aside, 0);
-    else {
-      // in front of the chest, where a hand that comes straight across has the room
-      rejectFrom(aside, 0, FORWARDS, 0, direction, 0);
-      if (length(aside, 0) > 0.1) unit(aside, 0, aside, 0);
-      else anyPerpendicular(aside, 0, direction, 0);
-    }
-    for (let i = 0; i < 3; i++) aside[i] *= near;
-    const leg = distanceBetween(aside, 0, position, 0);
-    if (leg < 1e-9) return distance;
-    for (let i = 0; i < 3; i++) direction[i] = (aside[i] - position[i]) / leg;
-    return leg + distanceBetween(target, 0, aside, 0);
+const aside = new Float64Array(3);
+
+/**
+ * Return the length of the path from `position` to `target` (3 each), straight or past a point beside the origin, and
+ * write its initial direction (3).
+ */
+export function pathTo(direction: Numbers, position: Numbers, target: Numbers, minDistance: number): number {
+  addScaled(direction, 0, target, 0, position, 0, -1);
+  const distance = length(direction, 0);
+  if (distance < 1e-12) {
+    setVector(direction, 0, 0, 0, 0);
+    return 0;
   }
+  for (let i = 0; i < 3; i++) direction[i] /= distance;
+  if (minDistance <= 0) return distance;
+  const along = -dot(position, 0, direction, 0);
+  const near = Math.min(SHOULDER_CLEARANCE, length(position, 0), length(target, 0));
+  if (!(along > 0 && along < distance)) return distance;
+  // the point of the straight path nearest to the origin
+  addScaled(aside, 0, position, 0, direction, 0, along);
+  const off = length(aside, 0);
+  if (off >= near) return distance;
+  if (off > 1e-3) unit(aside, 0, aside, 0);
+  else {
+    // in front of the chest, where a hand that comes straight across has the room
+    rejectFrom(aside, 0, FORWARDS, 0, direction, 0);
+    if (length(aside, 0) > 0.1) unit(aside, 0, aside, 0);
+    else anyPerpendicular(aside, 0, direction, 0);
+  }
+  for (let i = 0; i < 3; i++) aside[i] *= near;
+  const leg = distanceBetween(aside, 0, position, 0);
+  if (leg < 1e-9) return distance;
+  for (let i = 0; i < 3; i++) direction[i] = (aside[i] - position[i]) / leg;
+  return leg + distanceBetween(target, 0, aside, 0);
 }
 
 function clampDistance(position: Numbers, minDistance: number, maxDistance: number): void {

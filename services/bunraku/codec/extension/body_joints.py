@@ -1,23 +1,13 @@
-"""Extension tracks: further joints of a performer beside its motion, and the decoder of their blocks.
-
-proto/codec.md, 2.17, is the definition.
-"""
+"""Body extension in a track: description of its joints, layout of its blocks, and weights (proto/codec.md, 2.17)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
-
 import numpy as np
 
-from bunraku.codec import coefficients, transform
 from bunraku.codec.channel_layout import NONE, ChannelLayout, create_layout
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.integer_coder import decode_integers, encode_integers
-from bunraku.codec.motion_decoder import reconstruct
-from bunraku.codec.motion_track import step_size
-from bunraku.codec.prior import IntArray, Prior, load_shipped_prior
-from bunraku.codec.timing import Timing, parse_timing
+from bunraku.codec.prior import IntArray
 from bunraku.motion.extension import (
     DRIVE_UNIT,
     LENGTH_UNIT_M,
@@ -28,10 +18,6 @@ from bunraku.motion.extension import (
 )
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX
-
-EXTENSION_TYPE = "extension"
-EXTENSION_CODEC = "bunraku.extension/1"
-BODY_PART = "body"
 
 _TWIST_RADIUS_M = 0.04
 """Lever arm about a bone, for what turns with it."""
@@ -45,88 +31,11 @@ _PRIOR_CHANNELS = {
 _NECK_BIT, _CLAVICLES_BIT = 8, 16
 _ROW = 15
 """Integers of a joint: offset, rest and drive."""
-MAX_EXTENSION_BYTES = 512
+MAX_BODY_BYTES = 512
 
 
-@dataclass(frozen=True, slots=True)
-class ExtensionTrack(Timing):
-    """Timing and joints of the extension of one performer, which has this index among the motion's."""
-
-    performer: int
-    extension: BodyExtension
-    weights: Array = field(init=False, repr=False)
-    """Matrices (E, 3, 3) that convert the values of a joint, in radians, to the scale of the quantiser, metres."""
-    inverse_weights: Array = field(init=False, repr=False)
-    layout: ChannelLayout = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "weights", _joint_weights(self.extension))
-        object.__setattr__(self, "inverse_weights", np.ascontiguousarray(np.linalg.inv(self.weights)))
-        object.__setattr__(self, "layout", _create_extension_layout(self.extension.kinds))
-
-    @property
-    def kind(self) -> str:
-        """Type of the track."""
-        return EXTENSION_TYPE
-
-
-@dataclass(frozen=True, slots=True)
-class ExtensionBlock:
-    """A decoded block: quantised coefficients `q` (E, 3, K), and the dequantised `values` (E, 3, K) in radians."""
-
-    frames: int
-    q: IntArray
-    values: Array
-
-    def values_at(self, instants: Array | float) -> Array:
-        """Return the values (m, E, 3) at `instants` (m,), in frames from the first, -1/2 .. frames - 1/2."""
-        return transform.inverse_dct(self.values, self.frames, np.atleast_1d(np.asarray(instants, dtype=np.float64)))
-
-
-def decode_extension_block(track: ExtensionTrack, data: bytes, prior: Prior | None = None) -> ExtensionBlock:
-    """Decode one block of `track`. Raises `DamagedBlock`.
-
-    `prior` must be the one with which the block was encoded; the default is the shipped prior.
-    """
-    header, q = coefficients.decode_coefficients(
-        prior or load_shipped_prior(), data, track.block_frames, track.fps, track.layout
-    )
-    values = track.inverse_weights @ (reconstruct(q) * step_size(header.step, header.frames))
-    return ExtensionBlock(header.frames, q, values)
-
-
-def describe_extension_track(track: ExtensionTrack, rates: list[dict[str, float]]) -> dict[str, Any]:
-    """Return the entry of a Description's `tracks` for an extension (proto/messages.md, 3.2)."""
-    return {
-        "type": EXTENSION_TYPE,
-        "codec": EXTENSION_CODEC,
-        "channels": len(track.layout.axes),
-        "performer": track.performer,
-        "part": BODY_PART,
-        "fps": track.fps,
-        "frames": track.frames,
-        "block_frames": track.block_frames,
-        "first_frames": track.first_frames,
-        "rates": rates,
-        "joints": pack_extension(track.extension),
-    }
-
-
-def parse_extension_track(description: dict[str, Any]) -> ExtensionTrack:
-    """Return the track of `describe_extension_track`. Raises `DamagedBlock` if it is invalid or of another codec."""
-    codec, part, performer, joints = (description.get(key) for key in ("codec", "part", "performer", "joints"))
-    if codec != EXTENSION_CODEC or part != BODY_PART:
-        raise DamagedBlock(f"Unsupported extension of codec {codec!r} and part {part!r}.")
-    timing = parse_timing(description, EXTENSION_TYPE)
-    if not isinstance(performer, int) or performer < 0 or not isinstance(joints, bytes):
-        raise DamagedBlock("Invalid extension track: performer must be an index, and joints must be bytes.")
-    return ExtensionTrack(
-        timing.fps, timing.frames, timing.block_frames, timing.first_frames, performer, unpack_extension(joints)
-    )
-
-
-def pack_extension(extension: BodyExtension) -> bytes:
-    """Return the bytes of `joints` that describe an extension."""
+def pack_body(extension: BodyExtension) -> bytes:
+    """Return the bytes of `joints` that describe a body extension."""
     flags = extension.spine_count | _NECK_BIT * extension.has_neck | _CLAVICLES_BIT * extension.has_clavicles
     joints = [
         extension.offsets / LENGTH_UNIT_M,
@@ -138,15 +47,15 @@ def pack_extension(extension: BodyExtension) -> bytes:
     return bytes([flags]) + encode_integers(np.round(numbers).astype(np.int64), groups, mirrors)
 
 
-def unpack_extension(data: bytes) -> BodyExtension:
-    """Return the extension of `pack_extension`. Raises `DamagedBlock`."""
+def unpack_body(data: bytes) -> BodyExtension:
+    """Return the extension of `pack_body`. Raises `DamagedBlock`."""
     flags = data[0] if data else 0
     spine_count, has_neck, has_clavicles = flags & 7, bool(flags & _NECK_BIT), bool(flags & _CLAVICLES_BIT)
     count = spine_count + has_neck + 2 * has_clavicles
-    if spine_count > MAX_SPINE_JOINTS or count == 0 or flags >> 5 or len(data) > MAX_EXTENSION_BYTES:
+    if spine_count > MAX_SPINE_JOINTS or count == 0 or flags >> 5 or len(data) > MAX_BODY_BYTES:
         raise DamagedBlock(
             f"Invalid extension: its first byte is {flags} and it has {len(data)} bytes, expected a neck, clavicles or "
-            f"1..{MAX_SPINE_JOINTS} joints of the spine, and at most {MAX_EXTENSION_BYTES} bytes."
+            f"1..{MAX_SPINE_JOINTS} joints of the spine, and at most {MAX_BODY_BYTES} bytes."
         )
     integers = decode_integers(data[1:], *_integer_models(count, has_clavicles)).astype(np.float64)
     joints = integers[: count * _ROW].reshape(count, _ROW)
@@ -178,15 +87,16 @@ def _integer_models(count: int, has_clavicles: bool) -> tuple[IntArray, IntArray
     return np.array(groups, dtype=np.int64), np.array(mirrors, dtype=np.int64)
 
 
-def _create_extension_layout(kinds: list[JointKind]) -> ChannelLayout:
-    """Return the layout of an extension: the spine is a chain, of which neck and clavicles are the last link."""
+def create_body_layout(extension: BodyExtension) -> ChannelLayout:
+    """Return the layout of the blocks: the spine is a chain, of which neck and clavicles are the last link."""
+    kinds = extension.kinds
     spine = kinds.count(JointKind.SPINE)
     parents = [index - 1 if kind is JointKind.SPINE else spine - 1 for index, kind in enumerate(kinds)]
     mirrors = [index - 1 if index else NONE for index in range(len(kinds))]
     return create_layout([_PRIOR_CHANNELS[kind] for kind in kinds], parents, mirrors)
 
 
-def _joint_weights(extension: BodyExtension) -> Array:
+def body_weights(extension: BodyExtension) -> Array:
     """Return the weights (E, 3, 3): the lever arm about each axis of what a joint carries, in metres."""
     left, right = extension.ends[1], extension.ends[2]
     if extension.has_clavicles:

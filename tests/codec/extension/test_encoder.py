@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import decode_extension_block, pack_extension
+from bunraku.codec.extension.body_joints import pack_body
+from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.track import decode_extension_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.motion.analysis import analyse
 from bunraku.motion.extension import extend_pose
@@ -46,7 +47,7 @@ def test_decoded_joints_are_as_near_as_those_of_the_motion(level: int) -> None:
 
 
 def test_extension_of_a_swinging_dance_costs_a_third_of_the_motion_at_most() -> None:
-    added = sum(map(len, ENCODED.ladder[2].blocks)) + len(pack_extension(EXTENSION))
+    added = sum(map(len, ENCODED.ladder[2].blocks)) + len(pack_body(EXTENSION))
     assert added <= 0.34 * sum(map(len, MOTION.ladder[2].blocks))
 
 

@@ -8,13 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import (
+from bunraku.codec.extension.body_joints import pack_body, unpack_body
+from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.track import (
     ExtensionTrack,
     decode_extension_block,
-    pack_extension,
     parse_extension_track,
-    unpack_extension,
 )
 from bunraku.motion.analysis import analyse
 from tests.motion.extended_source import extended_source
@@ -47,8 +46,8 @@ def test_description_round_trips() -> None:
         {"joints": bytes([0]) + bytes(18)},
         {"joints": bytes([5]) + bytes(18)},
         {"joints": bytes([33]) + bytes(18)},
-        {"joints": pack_extension(EXTENSION) + bytes(512)},
-        {"joints": pack_extension(EXTENSION)[:1] + bytes(40)},
+        {"joints": pack_body(EXTENSION) + bytes(512)},
+        {"joints": pack_body(EXTENSION)[:1] + bytes(40)},
         {"frames": 0},
     ],
 )
@@ -62,7 +61,7 @@ def test_joints_round_trip(spine_count: int, has_neck: bool, has_clavicles: bool
     if not (spine_count or has_neck or has_clavicles):
         return
     extension = still_extension(spine_count, has_neck, has_clavicles)
-    unpacked = unpack_extension(pack_extension(extension))
+    unpacked = unpack_body(pack_body(extension))
     assert unpacked.names == extension.names
     np.testing.assert_allclose(unpacked.offsets, extension.offsets, atol=1e-12)
     assert np.isfinite(ExtensionTrack(30.0, 30, 30, 30, 0, unpacked).inverse_weights).all()

@@ -1,0 +1,1 @@
+"""Bonds of two hands."""
