@@ -18,9 +18,11 @@ import numpy as np
 CONTRACT = [
     "bunraku.codec.audio",
     "bunraku.codec.coefficients",
+    "bunraku.codec.extension.contact",
     "bunraku.codec.skeleton_description",
     "bunraku.codec.motion_decoder",
     "bunraku.codec.integer_coder",
+    "bunraku.codec.leb128",
     "bunraku.codec.timing",
     "bunraku.codec.motion_track",
     "bunraku.codec.channel_weights",

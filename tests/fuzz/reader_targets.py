@@ -6,17 +6,28 @@ failure. The reader of FBX is a compiled library that can end the process: its t
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 
 import numpy as np
+import numpy.typing as npt
 
+from bunraku.motion import rotation
+from bunraku.motion.analysis import analyse
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.face import face_of
+from bunraku.motion.hands import CHAIN_COUNT
+from bunraku.motion.naming.expression_mapping import map_expressions
+from bunraku.motion.naming.finger_mapping import map_fingers
 from bunraku.motion.readers.acclaim import parse_amc, parse_asf
 from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.readers.gltf import parse_gltf
 from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.source_motion import SourceMotion
-from tests.motion.readers.fbx_tree import MAGIC, to_binary
+from tests.motion.extended_source import write_source_bvh
+from tests.motion.hand_source import hand_source
+from tests.motion.readers.faces import FaceGlb, build_face_fbx
+from tests.motion.readers.fbx_tree import MAGIC, to_ascii, to_binary
 from tests.motion.readers.fbx_writer import build_fbx, write_fbx
 from tests.motion.readers.sources import pack_glb, unpack_glb, write_acclaim, write_glb, write_zip
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
@@ -42,6 +53,33 @@ def check_motion(motion: SourceMotion) -> None:
         positions, orientations = motion.world_transforms([count - 1], frames)
     assert positions.shape == (len(frames), count, 3)
     assert orientations.shape == (len(frames), count, 4)
+    check_face(motion)
+    check_fingers(motion, frames)
+
+
+def check_face(motion: SourceMotion) -> None:
+    """Assert that expressions have finite weights in all frames, and give a face."""
+    assert all(weights.shape == (motion.frame_count,) for weights in motion.expressions.values())
+    assert all(np.isfinite(weights).all() for weights in motion.expressions.values())
+    expressions, unknown = map_expressions(motion.expressions)
+    assert not set(unknown) & set(expressions)
+    if expressions:
+        face, values = face_of(expressions)
+        assert values.shape == (motion.frame_count, -(-len(face.axes) // 3), 3)
+        assert np.isfinite(values).all()
+
+
+def check_fingers(motion: SourceMotion, frames: npt.NDArray[np.int64]) -> None:
+    """Assert that the fingers below any joint are those of its descendants, and that a body's fingers are finite."""
+    with np.errstate(all="ignore"):
+        chains = map_fingers(motion.names, motion.parents, motion.rest_positions, [0, len(motion.names) // 2])
+    assert len(chains) == CHAIN_COUNT
+    assert all(len(set(chain.path)) == len(chain.path) for chain in chains)
+    if len(frames) < MAX_FRAMES:
+        # the analysis converts all frames
+        with np.errstate(all="ignore"), contextlib.suppress(UnreadableMotion):
+            hands = analyse(motion).hands
+            assert hands is None or np.isfinite(hands.values).all()
 
 
 def _accepts(read: Callable[[bytes], SourceMotion], data: bytes) -> bool:
@@ -82,6 +120,7 @@ def fbx(data: bytes) -> bool:
 TARGETS: list[Callable[[bytes], bool]] = [bvh, gltf, acclaim, archive]
 
 DICTIONARY = ["JOINT", "End Site", "CHANNELS", "OFFSET", "MOTION", "Frames:", ":hierarchy", ":bonedata", "dof", "begin"]
+DICTIONARY += ["weights", "targetNames", "VRMC_vrm_animation", "expressions", "preset", "lookAt", "Thumb", "Index"]
 DICTIONARY += ["accessors", "bufferViews", "animations", "children", "sampler", "VEC4", "CUBICSPLINE", "glTF", "JSON"]
 """Words of libFuzzer, for texts."""
 
@@ -100,11 +139,29 @@ def load_seeds() -> list[tuple[int, bytes]]:
         (1, glb),
         (1, pack_glb(document, binary)),
         (1, write_sparse_glb(source)),
+        (1, write_face_glb(source)),
+        (0, write_source_bvh(hand_source(2))),
         (2, asf + SEPARATOR + amc),
         (3, write_zip({"a.bvh": clip})),
         (3, write_zip({"03.asf": asf, "03_01.amc": amc})),
         (3, write_zip({"a.glb": glb, "b.txt": b"x"})),
     ]
+
+
+def write_face_glb(source: SourceMotion) -> bytes:
+    """Return a file with morph targets, expressions of a VRM model and of a VRM animation, and a gaze."""
+    weights = np.linspace(0.0, 1.0, source.frame_count)
+    glb = FaceGlb(write_glb(source))
+    node = glb.add_morphs({"jawOpen": weights, "eye_1": weights, "eye_2": weights}, source.fps)
+    glb.add_expressions({"happy": weights}, source.fps, custom={"tail": weights})
+    glb.add_gaze(np.tile(rotation.IDENTITY, (source.frame_count, 1)), source.fps)
+    binds = [{"node": node, "index": index, "weight": 1.0} for index in (1, 2)]
+    groups = [{"presetName": "blink_l", "binds": [{"mesh": 0, "index": 1, "weight": 100}]}]
+    glb.document["extensions"] |= {
+        "VRMC_vrm": {"expressions": {"preset": {"blink": {"morphTargetBinds": binds}}}},
+        "VRM": {"blendShapeMaster": {"blendShapeGroups": groups}},
+    }
+    return glb.pack()
 
 
 def write_sparse_glb(source: SourceMotion) -> bytes:
@@ -122,5 +179,7 @@ def write_sparse_glb(source: SourceMotion) -> bytes:
 
 def load_fbx_seeds() -> list[bytes]:
     """Return files that `fbx` accepts: in ASCII, and in binary with offsets of 32 and of 64 bits."""
-    tree = build_fbx(parse_bvh(export_bvh(smooth_motion(frames=5))), pre_rotation=(10.0, 20.0, 30.0))
-    return [write_fbx(), to_binary(tree, 7400), to_binary(tree, 7700, compress=True)]
+    source = parse_bvh(export_bvh(smooth_motion(frames=5)))
+    tree = build_fbx(source, pre_rotation=(10.0, 20.0, 30.0))
+    face = build_face_fbx(source, {"jawOpen": np.linspace(0.0, 1.0, 5), "joy": np.linspace(1.0, 0.0, 5)})
+    return [write_fbx(), to_binary(tree, 7400), to_binary(tree, 7700, compress=True), to_ascii(face)]

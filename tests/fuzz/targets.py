@@ -18,13 +18,19 @@ from bunraku.codec.audio import MAX_BLOCK_BYTES as LARGEST_AUDIO
 from bunraku.codec.audio import pack_audio_block, unpack_audio_block
 from bunraku.codec.coefficients import MAX_BLOCK_BYTES
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_track import ExtensionTrack, decode_extension_block, unpack_extension
+from bunraku.codec.extension.body_joints import unpack_body
+from bunraku.codec.extension.contact import decode_contact_block, pack_contact_block
+from bunraku.codec.extension.face_axes import unpack_face
+from bunraku.codec.extension.finger_joints import unpack_fingers
+from bunraku.codec.extension.track import Extension, ExtensionTrack, decode_extension_block
 from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_track import MOTION_CODEC, MotionTrack, parse_motion_track
 from bunraku.codec.prior import MAX_BLOCK_FRAMES, load_shipped_prior
 from bunraku.codec.skeleton_description import MAX_SKELETON_BYTES, SkeletonDescription
-from bunraku.motion.extension import extend_pose
-from bunraku.motion.rotation import IDENTITY
+from bunraku.motion.extension import BodyExtension, extend_pose
+from bunraku.motion.face import MAX_GAZE_RAD, Face, face_expressions
+from bunraku.motion.hands import WRISTS, Hands, pose_hands
+from bunraku.motion.rotation import IDENTITY, Array
 from bunraku.motion.skeleton import JOINT_COUNT, world_transforms
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Description, unpack
@@ -131,25 +137,52 @@ def audio(data: bytes) -> bool:
 
 
 def extension(data: bytes) -> bool:
-    """Parse the joints of an extension, whose length is the first byte, decode the block that follows, and pose it."""
-    size = data[0] if data else 0
+    """Parse the description of an extension, decode the block that follows, and pose it.
+
+    The first two bytes are its part and its length.
+    """
+    part, size = data[:2].ljust(2, b"\0")
+    described = data[2 : 2 + size]
+    extension: Extension
+    offsets = np.zeros(0, dtype=np.int64)
     try:
-        track = ExtensionTrack(30.0, 30, 30, 30, 0, unpack_extension(data[1 : 1 + size]))
+        if part == 0:
+            extension = unpack_body(described)
+        else:
+            extension, offsets = unpack_fingers(described) if part % 2 else unpack_face(described)
+        track = ExtensionTrack(30.0, 30, 30, 30, 0, extension, offsets)
         assert np.isfinite(track.weights).all()
         assert np.isfinite(track.inverse_weights).all()
-        block = decode_extension_block(track, data[1 + size :])
+        block = decode_extension_block(track, data[2 + size :])
     except DamagedBlock:
         return False
     assert block.q.nbytes + block.values.nbytes <= MAX_DECODED_BYTES
     values = block.values_at(np.array([-0.5, block.frames - 0.5]))
-    assert values.shape == (2, len(track.extension.names), 3)
+    assert values.shape == (2, len(track.layout.axes), 3)
+    for numbers in _pose_extension(extension, values):
+        assert np.isfinite(numbers).all()
+    return True
+
+
+def _pose_extension(extension: Extension, values: Array) -> list[Array]:
+    """Return what a viewer draws for the values of an extension; orientations are of length 1."""
     figure = TRACKS[0].figure
     still = np.tile(IDENTITY, (2, JOINT_COUNT, 1))
-    pose = extend_pose(figure, track.extension, *world_transforms(figure, np.zeros((2, 3)), still), values)
-    for numbers in pose:
-        assert np.isfinite(numbers).all()
-    assert np.allclose(np.linalg.norm(pose.extra_orientations, axis=-1), 1.0)
-    return True
+    placed = world_transforms(figure, np.zeros((2, 3)), still)
+    match extension:
+        case BodyExtension():
+            pose = extend_pose(figure, extension, *placed, values)
+            assert np.allclose(np.linalg.norm(pose.extra_orientations, axis=-1), 1.0)
+            return list(pose)
+        case Hands():
+            wrists = list(WRISTS)
+            hands = pose_hands(extension, placed[0][:, wrists], placed[1][:, wrists], values)
+            assert np.allclose(np.linalg.norm(hands.orientations, axis=-1), 1.0)
+            return list(hands)
+        case Face():
+            weights = face_expressions(extension, values)
+            assert np.abs(weights).max() <= MAX_GAZE_RAD
+            return [weights]
 
 
 def check_track(described: dict[str, Any]) -> MotionTrack:
@@ -164,7 +197,18 @@ def check_track(described: dict[str, Any]) -> MotionTrack:
     return track
 
 
-TARGETS: tuple[Callable[[bytes], bool], ...] = (block, skeleton_description, message, audio, extension)
+def contacts(data: bytes) -> bool:
+    """Decode a block of contacts. The first two bytes are its number of frames."""
+    frames = min(int.from_bytes(data[:2].ljust(2, b"\0"), "little") + 1, MAX_BLOCK_FRAMES)
+    try:
+        decoded = decode_contact_block(data[2:], frames)
+    except DamagedBlock:
+        return False
+    assert len(pack_contact_block(decoded.planted)) <= len(data[2:])
+    return True
+
+
+TARGETS: tuple[Callable[[bytes], bool], ...] = (block, skeleton_description, message, audio, extension, contacts)
 
 
 def _largest_block() -> bytes:
@@ -190,5 +234,15 @@ def load_seeds() -> list[tuple[int, bytes]]:
     joints = [base64.b64decode(track["joints"]) for track in extensions["tracks"]]
     for vector in [*extensions["valid"], *extensions["invalid"]]:
         described = joints[vector.get("track", 0)]
-        seeds.append((4, bytes([len(described)]) + described + base64.b64decode(vector["block"])))
+        seeds.append((4, bytes([0, len(described)]) + described + base64.b64decode(vector["block"])))
+    parts = load_golden("hands_face.json")
+    for vector in [*parts["valid"], *parts["invalid"]]:
+        track = parts["tracks"][vector.get("track", 0)]
+        described = base64.b64decode(track.get("joints") or track["axes"])
+        part = 1 if track["part"] == "fingers" else 2
+        seeds.append((4, bytes([part, len(described)]) + described + base64.b64decode(vector["block"])))
+    planted = load_golden("contacts.json")
+    for vector in [*planted["valid"], *planted["invalid"]]:
+        frames = len(vector["left"]) if "left" in vector else planted["tracks"][0]["block_frames"]
+        seeds.append((5, (frames - 1).to_bytes(2, "little") + base64.b64decode(vector["block"])))
     return seeds

@@ -57,8 +57,9 @@ HOSTILE_DESCRIPTIONS = st.builds(
         (2, golden_inputs(2)),
         (2, HOSTILE_DESCRIPTIONS),
         (3, golden_inputs(3)),
+        (5, golden_inputs(5)),
     ],
-    ids=["blocks", "dancers", "messages", "descriptions", "audio"],
+    ids=["blocks", "dancers", "messages", "descriptions", "audio", "contacts"],
 )
 def test_random_input_is_accepted_or_rejected_as_declared(
     number: int, inputs: st.SearchStrategy[bytes], tally: Callable[[str], None], request: pytest.FixtureRequest

@@ -52,6 +52,16 @@ def smooth_motion(frames: int = 90, seed: int = 0, swing: float = 0.5, fps: floa
     return Motion(figure, fps, root, rotations)
 
 
+def stepping_motion(frames: int = 90, fps: float = 30.0) -> Motion:
+    """A figure that stands, and lifts its right foot in the middle third."""
+    figure = straight_figure()
+    rotations = np.tile(rotation.IDENTITY, (frames, JOINT_COUNT, 1))
+    at = np.arange(frames) / frames
+    lift = 0.8 * np.clip(12 * np.minimum(at - 1 / 3, 2 / 3 - at), 0.0, 1.0)
+    rotations[:, JOINT_INDEX["r_hip"]] = rotation.from_rotation_vector(lift[:, None] * [-1.0, 0.0, 0.0])
+    return Motion(figure, fps, np.tile(figure.offsets[0], (frames, 1)), rotations)
+
+
 def pose_with_arms(degrees: float) -> Array:
     """World orientations (18, 4) of the figure with its arms raised to the sides by `degrees` from hanging."""
     angle = np.radians(degrees)

@@ -8,7 +8,7 @@ from bunraku.motion.analysis import analyse
 from bunraku.motion.extension import extend_pose
 from bunraku.motion.mirror import (
     OPPOSITE_JOINTS,
-    mirror_extension,
+    mirror_body,
     mirror_figure,
     mirror_heading,
     mirror_motion,
@@ -121,7 +121,7 @@ def test_mirrored_extension_gives_the_mirror_image_of_the_pose() -> None:
     placed = world_transforms(motion.figure, motion.root, motion.rotations)
     pose = extend_pose(motion.figure, extension, *placed, values)
     image = mirror_motion(motion)
-    mirrored, mirrored_values = mirror_extension(extension, values)
+    mirrored, mirrored_values = mirror_body(extension, values)
     image_placed = world_transforms(image.figure, image.root, image.rotations)
     image_pose = extend_pose(image.figure, mirrored, *image_placed, mirrored_values)
     order = [*range(len(extension.offsets) - 2), -1, -2]
@@ -129,7 +129,7 @@ def test_mirrored_extension_gives_the_mirror_image_of_the_pose() -> None:
     np.testing.assert_allclose(
         image_pose.positions, mirror_vectors(pose.positions[:, list(OPPOSITE_JOINTS)]), atol=1e-9
     )
-    again, again_values = mirror_extension(mirrored, mirrored_values)
+    again, again_values = mirror_body(mirrored, mirrored_values)
     np.testing.assert_array_equal(again_values, values)
     for name in ("offsets", "ends", "drive", "rest"):
         np.testing.assert_array_equal(getattr(again, name), getattr(extension, name))

@@ -9,10 +9,17 @@ import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.extension import ExtendedPose
 from bunraku.motion.extension_fit import ExtensionMotion, extended_pose, fit_body_extension
+from bunraku.motion.face import Face, face_of, gaze_of_eyes, shows_gaze
 from bunraku.motion.fit import FigureFit
+from bunraku.motion.hands import WRISTS
+from bunraku.motion.hands_fit import HandsMotion, fit_hands, measure_hands
 from bunraku.motion.joint_tree import common_ancestor
 from bunraku.motion.limb_fit import fit_arm, fit_leg
+from bunraku.motion.naming.expression_mapping import describe_unknown, map_expressions
+from bunraku.motion.naming.eye_mapping import map_eyes
+from bunraku.motion.naming.finger_mapping import FingerChain, map_fingers
 from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, find_head_by_name, map_by_name
 from bunraku.motion.naming.shape_mapping import find_head, map_by_shape
 from bunraku.motion.placement import MAX_STAGE_DISTANCE_M
@@ -20,6 +27,7 @@ from bunraku.motion.rest_pose import RestPose, find_rest_pose, resolve_sides, sa
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import (
     JOINT_COUNT,
+    JOINT_INDEX,
     JOINTS,
     Figure,
     Motion,
@@ -48,6 +56,14 @@ class JointFit(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+class FaceMotion:
+    """Face of a motion: the axes of its expressions, and the values (n, C, 3) of their channels."""
+
+    face: Face
+    values: Array
+
+
+@dataclass(frozen=True, slots=True)
 class Analysis:
     """Result of the analysis of a source.
 
@@ -55,7 +71,9 @@ class Analysis:
     maps H-Anim joints to source joints; `rest_pose` is "T", "A", "I", "bone-aligned" or "other"; `unit` the unit of
     length; `assumptions` are sentences for the uploader. Fit errors are distances between the figure's joints and the
     source's, over all mapped joints and frames, in millimetres; `joint_fits` has each joint's. `extension` has the
-    source's spine, neck and clavicles, if it has such joints; with them, the errors are the `extended` ones.
+    source's spine, neck and clavicles, if it has such joints; with them, the errors are the `extended` ones. `hands`
+    has the source's fingers, if it has any that move, with the errors of their joints on the extended figure; `face`
+    its face, if it has expressions or eyes that turn.
     """
 
     motion: Motion
@@ -70,13 +88,18 @@ class Analysis:
     extension: ExtensionMotion | None
     extended_mean_error_mm: float
     extended_max_error_mm: float
+    hands: HandsMotion | None = None
+    hands_mean_error_mm: float = 0.0
+    hands_max_error_mm: float = 0.0
+    face: FaceMotion | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class SourceFit:
     """Fit of a figure to a source: the state of the fit, and the rest pose and naming convention that led to it.
 
-    `moved` (3,) was added to all positions, in metres, because the source was off the floor or far from the stage.
+    `moved` (3,) was added to all positions, in metres, because the source was off the floor or far from the stage. The
+    fit begins at `first_frame` of the source.
     """
 
     fit: FigureFit
@@ -84,6 +107,7 @@ class SourceFit:
     profile: str
     moved: Array
     assumptions: list[str]
+    first_frame: int = 0
 
     def build_figure(self) -> Figure:
         """Return the figure; in its rest pose the lowest point is on the floor."""
@@ -114,7 +138,12 @@ def analyse(source: SourceMotion) -> Analysis:
             "The source may not have the body of a human."
         )
     extension = fit_body_extension(fit)
-    extended = apart if extension is None else _measure_extended(fit, figure, extension)
+    pose = None if extension is None else extended_pose(fit, figure, extension)
+    extended = apart if extension is None or pose is None else _measure_extended(fit, pose, extension)
+    hands = fit_hands(fit)
+    hands_apart = np.zeros(1)
+    if hands is not None:
+        hands_apart = measure_hands(fit, hands, (placed if pose is None else pose.positions)[:, list(WRISTS)])
     return Analysis(
         motion=motion,
         profile=fitted.profile,
@@ -131,12 +160,31 @@ def analyse(source: SourceMotion) -> Analysis:
         extension=extension,
         extended_mean_error_mm=float(extended.mean()),
         extended_max_error_mm=float(extended.max()),
+        hands=hands,
+        hands_mean_error_mm=float(hands_apart.mean()),
+        hands_max_error_mm=float(hands_apart.max()),
+        face=_read_face(source, fitted),
     )
 
 
-def _measure_extended(fit: FigureFit, figure: Figure, extension: ExtensionMotion) -> Array:
+def _read_face(source: SourceMotion, fitted: SourceFit) -> FaceMotion | None:
+    """Return the face of a source in the frames of the fit, None if it shows no known expression."""
+    expressions, unknown = map_expressions(source.expressions)
+    if unknown:
+        fitted.assumptions.append(describe_unknown(unknown))
+    expressions = {name: weights[fitted.first_frame :] for name, weights in expressions.items()}
+    fit = fitted.fit
+    if fit.eyes and not shows_gaze(expressions):
+        head = rotation.conjugate(fit.turn[:, [fit.joints[JOINT_INDEX["skullbase"]]]])
+        expressions |= gaze_of_eyes(rotation.multiply(head, fit.turn[:, fit.eyes])) or {}
+    if not expressions:
+        return None
+    face, values = face_of(expressions)
+    return FaceMotion(face, values) if face.axes else None
+
+
+def _measure_extended(fit: FigureFit, pose: ExtendedPose, extension: ExtensionMotion) -> Array:
     """Return the distances (n, m) of the extended figure's joints from the source's, millimetres."""
-    pose = extended_pose(fit, figure, extension)
     mapped = [joint for joint in sorted(fit.joints) if JOINTS[joint] != "vl5" or not extension.extension.spine_count]
     placed = np.concatenate([pose.positions[:, mapped], pose.extra_positions], axis=1)
     sources = [*(fit.joints[joint] for joint in mapped), *extension.sources]
@@ -158,8 +206,10 @@ def fit_source(source: SourceMotion) -> SourceFit:
         guessed.append(f"No naming convention matches; the skeleton's shape gave {pairs}.")
     rest = find_rest_pose(source, joints, frames, position, orientation)
     guessed += rest.assumptions
-    fit = FigureFit.from_source(source, joints, rest)
-    if _starts_with_calibration_pose(fit):
+    eyes = map_eyes(source.names, source.parents, joints["skullbase"]) if "skullbase" in joints else None
+    fit = FigureFit.from_source(source, joints, rest, _find_fingers(source, joints, rest), eyes or ())
+    first_frame = int(_starts_with_calibration_pose(fit))
+    if first_frame:
         guessed.append("The first frame is a pose apart from the dance; it was left out.")
         fit = fit.without_first_frame()
     moved = _move_to_stage(fit, guessed)
@@ -167,7 +217,13 @@ def fit_source(source: SourceMotion) -> SourceFit:
     for side in "lr":
         fit_leg(fit, side)
         fit_arm(fit, side)
-    return SourceFit(fit, rest, naming.profile, moved, guessed)
+    return SourceFit(fit, rest, naming.profile, moved, guessed, first_frame)
+
+
+def _find_fingers(source: SourceMotion, joints: dict[str, int], rest: RestPose) -> tuple[FingerChain, ...]:
+    """Return the source's joints of the ten fingers."""
+    positions = rest.scale * rotation.rotate(rest.rest_to_figure, rest.positions)
+    return map_fingers(source.names, source.parents, positions, [joints.get("l_wrist"), joints.get("r_wrist")])
 
 
 def _complete_mapping(source: SourceMotion, joints: dict[str, int], assumptions: list[str]) -> dict[str, int]:

@@ -9,6 +9,7 @@ import numpy as np
 from bunraku.motion import procrustes, rotation
 from bunraku.motion.joint_rule import JointRule, aim_at
 from bunraku.motion.joint_tree import ancestor_chain
+from bunraku.motion.naming.finger_mapping import FingerChain
 from bunraku.motion.rest_pose import RestPose
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINT_INDEX, PARENTS
@@ -20,9 +21,10 @@ class FigureFit:
     """Source in the figure's axes and metres, n frames, and the figure's joints fitted so far.
 
     `joints` maps H-Anim index to source index; `position` (n, J, 3) are the source's joints and `turn` (n, J, 4) their
-    rotation from rest; `rest_positions` (J, 3) and `rest_orientations` (J, 4) describe the source at rest. Of the
-    figure: `offsets` and `tips` (18, 3), `rules` by H-Anim index, `joint_positions` (n, 18, 3) and `joint_orientations`
-    (n, 18, 4) in the world.
+    rotation from rest; `rest_positions` (J, 3) and `rest_orientations` (J, 4) describe the source at rest. `fingers`
+    are the source's joints of the ten fingers, `eyes` those of the left and the right eye; empty if they are not
+    followed. Of the figure: `offsets` and `tips` (18, 3), `rules` by H-Anim index, `joint_positions` (n, 18, 3) and
+    `joint_orientations` (n, 18, 4) in the world.
     """
 
     source: SourceMotion
@@ -32,6 +34,8 @@ class FigureFit:
     turn: Array
     rest_positions: Array
     rest_orientations: Array
+    fingers: tuple[FingerChain, ...] = ()
+    eyes: tuple[int, ...] = ()
     offsets: Array = field(init=False)
     tips: Array = field(init=False)
     rules: dict[int, JointRule] = field(init=False)
@@ -45,10 +49,18 @@ class FigureFit:
         self.joint_positions, self.joint_orientations = np.zeros((n, JOINT_COUNT, 3)), np.zeros((n, JOINT_COUNT, 4))
 
     @classmethod
-    def from_source(cls, source: SourceMotion, joints: dict[str, int], rest: RestPose) -> FigureFit:
+    def from_source(
+        cls,
+        source: SourceMotion,
+        joints: dict[str, int],
+        rest: RestPose,
+        fingers: tuple[FingerChain, ...] = (),
+        eyes: tuple[int, ...] = (),
+    ) -> FigureFit:
         """Return the whole clip of `source` in the figure's axes, with no joint placed yet."""
         index = {JOINT_INDEX[name]: joint for name, joint in joints.items()}
-        used = sorted({ancestor for joint in index.values() for ancestor in ancestor_chain(source.parents, joint)})
+        followed = {*index.values(), *eyes, *(joint for finger in fingers for joint in finger.path)}
+        used = sorted({ancestor for joint in followed for ancestor in ancestor_chain(source.parents, joint)})
         position, orientation = source.world_transforms(used)
         axes = rotation.multiply(rest.rest_to_figure, rest.orientations)
         turn = np.zeros_like(orientation)
@@ -62,6 +74,8 @@ class FigureFit:
             turn=turn,
             rest_positions=rest.scale * rotation.rotate(rest.rest_to_figure, rest.positions),
             rest_orientations=axes,
+            fingers=fingers,
+            eyes=eyes,
         )
 
     def without_first_frame(self) -> FigureFit:

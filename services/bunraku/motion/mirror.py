@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from bunraku.motion.extension import BodyExtension, JointKind
+from bunraku.motion.face import AXIS_MIRRORS, Face
+from bunraku.motion.hands import FINGERS, Hands
 from bunraku.motion.placement import Placement
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Figure, Motion
@@ -54,8 +56,8 @@ def mirror_heading(heading: float) -> float:
     return 0.0 - heading
 
 
-def mirror_extension(extension: BodyExtension, values: Array) -> tuple[BodyExtension, Array]:
-    """Return the mirror image of an extension and of its values (n, E, 3)."""
+def mirror_body(extension: BodyExtension, values: Array) -> tuple[BodyExtension, Array]:
+    """Return the mirror image of a body extension and of its values (n, E, 3)."""
     order = list(range(len(extension.offsets)))
     if extension.has_clavicles:
         order[-2:] = order[:-3:-1]
@@ -72,3 +74,20 @@ def mirror_extension(extension: BodyExtension, values: Array) -> tuple[BodyExten
         rest=extension.rest[order] * turned,
     )
     return mirrored, values[:, order] * turned
+
+
+def mirror_hands(hands: Hands, values: Array) -> tuple[Hands, Array]:
+    """Return the mirror images of fingers and of their values (n, E, 3)."""
+    chains = [*range(len(FINGERS), 2 * len(FINGERS)), *range(len(FINGERS))]
+    counts = tuple(hands.counts[chain] for chain in chains)
+    joints = {joint: index for index, joint in enumerate(hands.joints)}
+    mirrored = Hands(counts, mirror_vectors(hands.bases[chains]), hands.lengths[chains])
+    order = [joints[chains[chain], place] for chain, place in mirrored.joints]
+    return mirrored, values[:, order] * _ROTATION_REFLECTION[1:]
+
+
+def mirror_face(face: Face, values: Array) -> tuple[Face, Array]:
+    """Return the mirror image of a face and of the values (n, C, 3) of its channels."""
+    signs = np.ones(values[0].size)
+    signs[: len(face.axes)] = AXIS_MIRRORS[list(face.axes)]
+    return face, values * signs.reshape(-1, 3)

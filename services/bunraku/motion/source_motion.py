@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -70,6 +70,10 @@ class SourceMotion(Protocol):
     def rest_orientations(self) -> Array:
         """World orientations (J, 4) at rest."""
 
+    @property
+    def expressions(self) -> dict[str, Array]:
+        """Weights (n,) of blend shapes in all frames by their names in the file; of a gaze, radians."""
+
     def world_transforms(self, joints: list[int], frames: npt.NDArray[np.int64] | None = None) -> tuple[Array, Array]:
         """Return world positions (n, J, 3) and orientations (n, J, 4) of `joints` and their ancestors.
 
@@ -91,6 +95,7 @@ class SampledMotion:
     orientations: Array
     notes: tuple[str, ...] = ()
     metres_per_unit: float | None = None
+    expressions: dict[str, Array] = field(default_factory=dict)
 
     @property
     def joint_lines(self) -> tuple[int | None, ...]:

@@ -122,18 +122,23 @@ def add_track(
     objects = [block("AnimationCurveNode", number, ObjectName("AnimCurveNode", prop[4]), "")]
     links = [leaf("C", "OO", number, layer), leaf("C", "OP", number, model, prop)]
     for axis in range(3):
-        curve = block("AnimationCurve", number + 1 + axis, ObjectName("AnimCurve", ""), "")
-        curve.children = [
-            leaf("KeyVer", 4008),
-            leaf("KeyTime", times),
-            leaf("KeyValueFloat", values[:, axis]),
-            leaf("KeyAttrFlags", np.array([key_flags])),
-            leaf("KeyAttrDataFloat", np.zeros(4)),
-            leaf("KeyAttrRefCount", np.array([len(times)])),
-        ]
-        objects.append(curve)
+        objects.append(build_curve(number + 1 + axis, times, values[:, axis], key_flags))
         links.append(leaf("C", "OP", number + 1 + axis, number, f"d|{'XYZ'[axis]}"))
     return objects, links
+
+
+def build_curve(number: int, times: npt.NDArray[np.int64], values: Array, key_flags: int = LINEAR_KEYS) -> FbxNode:
+    """Return a curve with `values` (n,) at `times` in ticks."""
+    curve = block("AnimationCurve", number, ObjectName("AnimCurve", ""), "")
+    curve.children = [
+        leaf("KeyVer", 4008),
+        leaf("KeyTime", times),
+        leaf("KeyValueFloat", values),
+        leaf("KeyAttrFlags", np.array([key_flags])),
+        leaf("KeyAttrDataFloat", np.zeros(4)),
+        leaf("KeyAttrRefCount", np.array([len(times)])),
+    ]
+    return curve
 
 
 def write_fbx_6(source: SourceMotion) -> bytes:

@@ -95,6 +95,8 @@ def set_path(*path: str | int, value: object) -> Callable[[dict[str, Any]], obje
         (set_path("accessors", 1, "count", value=5), "Broken glTF file"),
         (set_path("accessors", 1, "count", value=10**9), "Broken glTF file"),
         (set_path("accessors", 1, "componentType", value=5130), "Broken glTF file"),
+        (set_path("accessors", 1, "componentType", value=[]), "Broken glTF file"),
+        (set_path("accessors", 1, "type", value=[]), "Broken glTF file"),
         (set_path("accessors", 1, "sparse", value={}), "Broken glTF file"),
         (set_path("accessors", 1, "byteOffset", value=4), "Broken glTF file"),
         (set_path("bufferViews", 1, "byteOffset", value=10**8), "Broken glTF file"),
@@ -139,3 +141,9 @@ def test_values_that_are_no_numbers_are_refused() -> None:
     struct.pack_into("<f", binary, DOCUMENT["bufferViews"][1]["byteOffset"], float("nan"))
     with pytest.raises(UnreadableMotion, match="no numbers"):
         parse_gltf(pack_glb(DOCUMENT, bytes(binary)))
+
+
+def test_channels_whose_property_is_no_word_are_skipped() -> None:
+    document = copy.deepcopy(DOCUMENT)
+    document["animations"][0]["channels"][1]["target"]["path"] = ["rotation"]
+    assert parse_gltf(pack_glb(document, BINARY)).frame_count == SOURCE.frame_count

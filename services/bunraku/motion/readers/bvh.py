@@ -68,6 +68,11 @@ class Bvh:
         return len(self.frames)
 
     @property
+    def expressions(self) -> dict[str, Array]:
+        """Weights of blend shapes: BVH files have none."""
+        return {}
+
+    @property
     def channel_columns(self) -> list[int]:
         """First column of each joint's channels in `frames`."""
         widths = [len(channels) for channels in self.channels]

@@ -6,6 +6,7 @@ import ctypes
 import gc
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,14 @@ import ufbx
 
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
-from bunraku.motion.readers.node_motion import Node, NodeMotion, Track, choose_rate, sample_nodes
+from bunraku.motion.readers.node_motion import (
+    Node,
+    NodeMotion,
+    Track,
+    check_shape_frames,
+    choose_rate,
+    sample_nodes,
+)
 from bunraku.motion.readers.takes import choose_take, describe_choice, name_takes
 from bunraku.motion.rotation import Array
 
@@ -70,8 +78,10 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
         notes = [*describe_choice(names, chosen), *_describe_muted_layers(stacks[chosen], keep)]
         unit = _read_unit(keep(scene.settings), keep)
         motion = sample_nodes(nodes, start, end, choose_rate(times), notes, unit)
-        _sample_tracks(keep(stacks[chosen].anim), motion, elements)
-        return motion
+        animation = keep(stacks[chosen].anim)
+        _sample_tracks(animation, motion, elements)
+        shapes = _find_blend_shapes(scene, stacks[chosen], keep)
+        return replace(motion, expressions=_sample_blend_shapes(animation, motion, shapes))
 
 
 def list_fbx_takes(data: bytes) -> list[str]:
@@ -188,7 +198,7 @@ def _read_nodes(scene: ufbx.Scene, keep: _Keep) -> tuple[list[Node], list[ufbx.N
 
 def _sample_tracks(animation: ufbx.Anim, motion: NodeMotion, elements: Sequence[ufbx.Node]) -> None:
     """Give each node of `motion` its transforms in all frames as tracks."""
-    times = motion.start + np.arange(motion.frame_count) / motion.fps
+    times = motion.times
     for node, element in zip(motion.nodes, elements, strict=True):
         sampled = np.array(
             [
@@ -206,6 +216,37 @@ def _sample_tracks(animation: ufbx.Anim, motion: NodeMotion, elements: Sequence[
         node.tracks["translation"] = Track(times, sampled[:, :3])
         node.tracks["rotation"] = Track(times, rotation.normalise(sampled[:, [6, 3, 4, 5]]))
         node.tracks["scale"] = Track(times, sampled[:, 7:])
+
+
+def _find_blend_shapes(scene: ufbx.Scene, stack: ufbx.AnimStack, keep: _Keep) -> list[ufbx.BlendChannel]:
+    """Return the blend shapes whose weight a take animates, in the order of the file."""
+    moved = {
+        keep(keep(prop).element).element_id
+        for layer in [keep(layer) for layer in keep(stack.layers)]
+        for prop in keep(layer.anim_props)
+        if keep(prop).prop_name == "DeformPercent"
+    }
+    return [channel for channel in [keep(each) for each in keep(scene.blend_channels)] if channel.element_id in moved]
+
+
+def _sample_blend_shapes(
+    animation: ufbx.Anim, motion: NodeMotion, channels: Sequence[ufbx.BlendChannel]
+) -> dict[str, Array]:
+    """Return the weights (n,) of blend shapes in all frames; the largest of those with the same name."""
+    check_shape_frames(motion.frame_count, len(channels))
+    found: dict[str, Array] = {}
+    for number, channel in enumerate(channels):
+        name = channel.name or f"blend shape {number}"
+        weights = np.array([ufbx.evaluate_blend_weight(animation, channel, time) for time in motion.times.tolist()])
+        if not (np.abs(weights) <= MAX_VALUE).all():
+            raise UnreadableMotion(
+                "Broken FBX file",
+                f"a weight is no number, or beyond {MAX_VALUE:.0e}",
+                field=name,
+                hint="the export went wrong; export it again, or without blend shapes",
+            )
+        found[name] = np.maximum(found[name], weights) if name in found else weights
+    return found
 
 
 def _as_arrays(transform: ufbx.Transform) -> tuple[Array, Array, Array]:

@@ -6,12 +6,20 @@ bones name the nodes here.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from bunraku.motion import rotation
 from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.readers.gltf_face import (
+    WEIGHTS,
+    find_expression_nodes,
+    find_gaze_node,
+    read_weights,
+    sample_expressions,
+)
 from bunraku.motion.readers.gltf_file import GltfFile, broken, check_index, check_objects, parse_gltf_file
 from bunraku.motion.readers.node_motion import (
     Interpolation,
@@ -28,7 +36,7 @@ MAX_NODES = 1_000
 """Joints that are read, those that carry nothing but meshes left out."""
 METRES_PER_UNIT = 1.0
 """Unit of length (glTF 2.0, 3.4)."""
-COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
+COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3, WEIGHTS: 1}
 _HUMANOIDS = (("VRMC_vrm_animation", "humanoid"), ("VRMC_vrm", "humanoid"), ("VRM", "humanoid"))
 
 
@@ -45,13 +53,17 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
         )
     names = _take_names(animations)
     channels = [_find_channels(file, animation, f"animations[{number}]") for number, animation in enumerate(animations)]
-    chosen = choose_take(names, [len({node for node, _ in moved}) for moved in channels], take)
+    chosen = choose_take(names, [len({node for node, path in moved if path != WEIGHTS}) for moved in channels], take)
     tracks = _read_tracks(file, animations[chosen], channels[chosen], f"animations[{chosen}]")
-    nodes, kept = _read_nodes(file, {node for node, _ in tracks})
-    for (node, path), track in tracks.items():
+    moved = _find_moved(file, tracks)
+    nodes, kept = _read_nodes(file, {node for node, _ in moved})
+    for (node, path), track in moved.items():
         nodes[kept[node]].tracks[path] = track
-    times = [track.times for track in tracks.values()]
-    if not times:
+    times = [track.times for (_, path), track in tracks.items() if path != WEIGHTS]
+    if all(each[0] == times[0][0] == each[-1] for each in times):
+        # only the face moves
+        times = [track.times for track in tracks.values()]
+    if not nodes or not times:
         raise UnreadableMotion(
             "Nothing moves",
             f"the animation {quote_excerpt(names[chosen])} moves no node",
@@ -59,7 +71,8 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
             hint="export the motion of the skeleton; blend shapes alone move no joint",
         )
     start, end = min(float(each[0]) for each in times), max(float(each[-1]) for each in times)
-    return sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen), METRES_PER_UNIT)
+    motion = sample_nodes(nodes, start, end, choose_rate(times), describe_choice(names, chosen), METRES_PER_UNIT)
+    return replace(motion, expressions=sample_expressions(file, tracks, motion))
 
 
 def list_gltf_takes(data: bytes) -> list[str]:
@@ -76,12 +89,17 @@ _Channels = dict[tuple[int, str], object]
 
 
 def _find_channels(file: GltfFile, animation: dict[str, Any], where: str) -> _Channels:
-    """Return the channels of an animation. Those of other properties are skipped."""
+    """Return the channels of an animation, without those of other properties, and weights of nodes without mesh."""
     found: _Channels = {}
     for channel in check_objects(animation.get("channels", []), f"{where}.channels"):
         target = channel.get("target")
-        if isinstance(target, dict) and target.get("path") in COMPONENTS and "node" in target:
-            found[file.check_index("nodes", target["node"]), target["path"]] = channel.get("sampler")
+        if not isinstance(target, dict) or "node" not in target:
+            continue
+        path = target.get("path")
+        if isinstance(path, str) and path in COMPONENTS:
+            node = file.check_index("nodes", target["node"])
+            if path != WEIGHTS or "mesh" in file.item("nodes", node):
+                found[node, path] = channel.get("sampler")
     return found
 
 
@@ -101,6 +119,13 @@ def _read_tracks(
     return found
 
 
+def _find_moved(file: GltfFile, tracks: dict[tuple[int, str], Track]) -> dict[tuple[int, str], Track]:
+    """Return the tracks of nodes that may be joints, without those that stand for the expressions of a face."""
+    bones = _humanoid_bones(file)
+    of_face = {node for node in (*find_expression_nodes(file), find_gaze_node(file)) if node not in bones}
+    return {(node, path): track for (node, path), track in tracks.items() if path != WEIGHTS and node not in of_face}
+
+
 def _read_times(file: GltfFile, index: object, where: str) -> Array:
     times = file.read_accessor(index, 1)[:, 0]
     if not np.isfinite(times).all() or (np.diff(times) < 0.0).any() or abs(times).max() > 1e6:
@@ -115,6 +140,8 @@ def _read_track(file: GltfFile, sampler: dict[str, Any], times: Array, path: str
         raise broken(where, f"interpolation is {quote_excerpt(str(sampler['interpolation']))}") from error
     values = file.read_accessor(sampler.get("output"), COMPONENTS[path])
     per_key = 3 if interpolation is Interpolation.CUBIC else 1
+    if path == WEIGHTS and np.isfinite(values).all():
+        return read_weights(values, times, interpolation, where)
     if len(values) != per_key * len(times):
         raise broken(where, f"a {path} has {len(times)} keys and {len(values)} values")
     if not np.isfinite(values).all():

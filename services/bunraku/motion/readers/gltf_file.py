@@ -6,8 +6,9 @@ import base64
 import binascii
 import json
 import struct
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,6 +26,7 @@ _CHUNK = struct.Struct("<I4s")
 _COMPONENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _DTYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _INDEX_DTYPES = {code: _DTYPES[code] for code in (5121, 5123, 5125)}
+_Value = TypeVar("_Value")
 _REEXPORT = "export the file again, as GLB"
 _DATA_URI = "data:"
 
@@ -57,8 +59,8 @@ class GltfFile:
         """Return the values (n, `components`) of an accessor; normalised integers become -1..1 or 0..1."""
         accessor = self.item("accessors", index)
         where = f"accessors[{index}]"
-        count, dtype = accessor.get("count"), _DTYPES.get(accessor.get("componentType", 0))
-        if _COMPONENTS.get(accessor.get("type", "")) != components or dtype is None:
+        count, dtype = accessor.get("count"), _look_up(_DTYPES, accessor.get("componentType"))
+        if _look_up(_COMPONENTS, accessor.get("type")) != components or dtype is None:
             raise broken(where, f"it has no elements of {components} numbers")
         if isinstance(count, bool) or not isinstance(count, int) or not 0 < count <= MAX_VALUES // components:
             raise broken(where, f"count is {quote_excerpt(str(count))}")
@@ -91,7 +93,7 @@ class GltfFile:
             if not isinstance(part, dict) or "bufferView" not in part:
                 raise broken(f"{where}.{name}", "it has no bufferView")
             parts.append(part)
-        index_type = _INDEX_DTYPES.get(parts[0].get("componentType", 0))
+        index_type = _look_up(_INDEX_DTYPES, parts[0].get("componentType"))
         if index_type is None:
             raise broken(f"{where}.indices", "its componentType is none of indices")
         indices = self._read_view(parts[0], np.dtype(index_type), count, 1, f"{where}.indices")[:, 0].astype(np.int64)
@@ -209,6 +211,11 @@ def check_index(index: object, items: list[Any], name: str) -> int:
     if isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < len(items):
         raise broken(name, f"there is no number {quote_excerpt(str(index))}")
     return index
+
+
+def _look_up(table: Mapping[Any, _Value], key: object) -> _Value | None:
+    """Return the value of a key that a file gives, None if there is none; it may be of any type of JSON."""
+    return table.get(key) if isinstance(key, int | str) else None
 
 
 def broken(field: str, detail: str) -> UnreadableMotion:

@@ -17,6 +17,8 @@ from bunraku.motion.source_motion import NTSC_RATES, EndSite
 
 MAX_FRAMES, MAX_JOINT_FRAMES = 1_000_000, 8_000_000
 """Bounds of the frames that sparse keys are sampled at, and of frames times joints."""
+MAX_SHAPES = 2_000
+"""Blend shapes that are read; faces of production have a few hundred."""
 MIN_FPS, MAX_FPS, DEFAULT_FPS = 24.0, 240.0, 60.0
 """Keys that are less dense than `MIN_FPS` are sampled at `DEFAULT_FPS`."""
 MIN_SCALE = 1e-9
@@ -117,6 +119,12 @@ class NodeMotion:
     frame_count: int
     notes: tuple[str, ...] = ()
     metres_per_unit: float | None = None
+    expressions: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def times(self) -> Array:
+        """Times (n,) of the frames, in seconds."""
+        return self.start + np.arange(self.frame_count) / self.fps
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -228,3 +236,19 @@ def sample_nodes(
             hint="cut the animation into shorter ones, or export the body's joints only",
         )
     return NodeMotion(tuple(nodes), start, fps, frame_count, tuple(notes), metres_per_unit)
+
+
+def check_shape_frames(frame_count: int, shape_count: int) -> None:
+    """Raise `UnreadableMotion` if there are too many blend shapes, or too many weights of them."""
+    if shape_count > MAX_SHAPES:
+        raise UnreadableMotion(
+            "Too much motion",
+            f"over {MAX_SHAPES:,} of them move",
+            hint="export the blend shapes of the face only",
+        )
+    if frame_count * shape_count > MAX_JOINT_FRAMES:
+        raise UnreadableMotion(
+            "Too much motion",
+            f"{frame_count:,} frames of {shape_count:,} blend shapes are more than {MAX_JOINT_FRAMES:,}",
+            hint="cut the animation into shorter ones, or export the blend shapes of the face only",
+        )

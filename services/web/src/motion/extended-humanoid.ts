@@ -1,6 +1,6 @@
 /**
- * The extended figure as a VRM 1.0 humanoid: chest, upper chest, neck and shoulders beside the bones of `humanoid`, from
- * the same T-pose.
+ * The extended figure as a VRM 1.0 humanoid: chest, upper chest, neck and shoulders beside the bones of `humanoid`,
+ * from the same T-pose.
  */
 
 import type { BodyExtension, ExtendedPose } from "./extension";
@@ -30,7 +30,9 @@ export function trunkJoints(spineCount: number, count: number): number[] {
   return Array.from({ length: count }, (_, bone) => Math.round((bone * (spineCount - 1)) / (count - 1)));
 }
 
-/** A bone of the humanoid, and the joint whose orientation it has: of the figure, or of the extension (-1: the root). */
+/**
+ * A bone of the humanoid, and the joint whose orientation it has: of the figure, or of the extension (-1: the root).
+ */
 interface HumanoidBone {
   readonly name: string;
   readonly parent: number;

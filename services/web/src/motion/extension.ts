@@ -3,6 +3,9 @@
  * computes what `motion/extension.py` does in Python, where the model is described.
  */
 
+import type { FacePose } from "./face";
+import type { FootContacts } from "./foot-contact";
+import type { HandsPose } from "./hands";
 import { conjugate, fromRotationVector, multiply, type Numbers, rotate, toRotationVector } from "./rotation";
 import { type Figure, JOINT_COUNT, JOINTS, type Pose, type WorldTransforms } from "./skeleton";
 import { addScaled, dot, length, normalise, rotationBetween, setVector, unit } from "./vector";
@@ -70,9 +73,15 @@ export interface ExtendedPose extends WorldTransforms {
   readonly extraOrientations: Float64Array;
 }
 
-/** Pose of a performer on the stage; `extended` has the joints of its extension, if it has one. */
+/**
+ * Pose of a performer on the stage, with what its extensions add: further joints of the body, fingers, a face, and the
+ * contacts of its feet, null if they are not known.
+ */
 export interface StagedPose extends Pose {
   extended?: ExtendedPose | null;
+  hands?: HandsPose | null;
+  face?: FacePose | null;
+  contacts?: FootContacts | null;
 }
 
 /** Create storage for `extendPose`. */

@@ -2,12 +2,12 @@ import * as fc from "fast-check";
 import { expect, test } from "vitest";
 import { createExtendedPose, extendPose, extensionKinds, extensionNames, meetBone } from "../../src/motion/extension";
 import { createWorldTransforms, type Figure, worldTransforms } from "../../src/motion/skeleton";
-import { extensionVectors, goldenExtensionTrack } from "../golden-extensions";
+import { extensionVectors, goldenBody } from "../golden-extensions";
 
 const golden = extensionVectors();
 
 test.each(golden.poses)("golden pose of track $track", (vector) => {
-  const { extension } = goldenExtensionTrack(golden.tracks[vector.track]);
+  const extension = goldenBody(golden.tracks[vector.track]);
   const figure: Figure = { offsets: Float64Array.from(vector.offsets), tips: new Float64Array(54) };
   const pose = { root: Float64Array.from(vector.root), rotations: Float64Array.from(vector.rotations) };
   const world = worldTransforms(figure, pose, createWorldTransforms());

@@ -1,0 +1,1 @@
+"""Contacts of a performer with its surroundings."""
