@@ -35,6 +35,6 @@ def test_description_fits_the_motion() -> None:
     description = values["description"]
     assert description["name"] == choreography.TITLE
     assert description["duration"] == stored.first_track.duration_us * 1e-6 >= 20
-    assert description["tracks"] == ["motion", "audio", "camera", "light", "light", "light"]
+    assert description["tracks"] == ["motion", "audio", "camera", "light", "light", "light", "extension"]
     assert description["audio"]["seconds"] == pytest.approx(description["duration"])
     assert [len(rates[0]) for rates in stored.packets if rates] == [track.block_count for track in stored.tracks]

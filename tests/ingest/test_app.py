@@ -30,7 +30,7 @@ async def test_upload_creates_a_motion_once(server: str) -> None:
     assert first.headers["location"] == f"/v1/motions/{motion['id']}"
     assert motion["name"] == "My dance"
     assert motion["duration"] == pytest.approx(3.4)
-    assert (motion["fps"], motion["frames"], motion["blocks"]) == (30, 102, 4)
+    assert (motion["fps"], motion["frames"], motion["blocks"]) == (30, 102, 3)
     assert len(motion["joints"]) == 18
     assert motion["fit"]["mean_mm"] < 1
     assert len(motion["rates"]) >= 3

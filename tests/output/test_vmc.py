@@ -7,12 +7,15 @@ from hypothesis import strategies as st
 from pythonosc.osc_message import OscMessage
 
 from bunraku.motion import rotation
-from bunraku.motion.humanoid import BONE_JOINTS, BONE_PARENTS, BONES
+from bunraku.motion.hands import WRISTS, pose_hands
+from bunraku.motion.humanoid import BONE_JOINTS, BONE_PARENTS, BONES, T_POSE_TO_REST
 from bunraku.motion.skeleton import JOINT_INDEX, Figure, standard_figure, world_transforms
+from bunraku.motion.unity_axes import from_xyzw, mirror_rotations, mirror_vectors
 from bunraku.output.osc import pack_datagrams
-from bunraku.output.vmc import make_frame
+from bunraku.output.vmc import FINGER_BONES, make_frame
 from tests.output.bone_angles import FIGURE_JOINTS, MIRROR, max_bone_angle
 from tests.output.vmc_receiver import UNITY_PARENTS, UnityPose, parse_packet, receive_frame
+from tests.vectors.hands_face import make_hands
 
 FIGURE = standard_figure()
 AT_REST = np.tile(rotation.IDENTITY, (18, 1))
@@ -116,3 +119,39 @@ def test_frame_is_one_bundle_or_single_messages(single: bool) -> None:
     assert all(datagram.startswith(b"/VMC/Ext/" if single else b"#bundle\0") for datagram in datagrams)
     # a bundle is two packets of Ethernet at most
     assert sum(map(len, datagrams)) < 2 * 1472
+
+
+@given(random_rotations(), st.integers(0, 1000), st.floats(0.5, 2.0))
+def test_fingers_are_where_the_figure_has_them(rotations: np.ndarray, seed: int, scale: float) -> None:
+    hands, values = make_hands(seed, (3, 2, 0, 1, 3, 3, 3, 3, 3, 3), 2)
+    messages = make_frame(FIGURE, np.zeros(3), rotations, 0.0, fingers=(hands, values[0]), scale=scale)
+    sent = {message.params[0]: np.array(message.params[1:]) for message in messages if "Bone" in message.address}
+    assert {"LeftThumbDistal", "RightLittleDistal"} < sent.keys()
+    assert not {"LeftMiddleProximal", "LeftIndexDistal"} & sent.keys()
+    places, turns = world_transforms(FIGURE, np.zeros(3), rotations)
+    wrists = list(WRISTS)
+    pose = pose_hands(hands, places[None, wrists], turns[None, wrists], values[:1])
+    for joint, (chain, place) in enumerate(hands.joints):
+        if place == 0:
+            wrist = WRISTS[chain // 5]
+            position, turn = places[wrist], rotation.multiply(turns[wrist], T_POSE_TO_REST[wrist])
+        bone = sent[FINGER_BONES[chain][place]]
+        position = position + rotation.rotate(turn, mirror_vectors(bone[:3])) / scale
+        turn = rotation.multiply(turn, mirror_rotations(from_xyzw(bone[3:])))
+        np.testing.assert_allclose(position, pose.positions[0, joint], atol=1e-5)
+
+
+def test_face_is_sent_with_both_names_of_its_presets_and_applied_once() -> None:
+    expressions = {"aa": 0.7, "jawOpen": 0.4, "gazeYaw": np.pi / 2, "gazePitch": 0.0}
+    messages = make_frame(FIGURE, np.zeros(3), AT_REST, 0.0, expressions=expressions)
+    face = [(message.address, *message.params) for message in messages if "Blend" in message.address]
+    assert face[-1] == ("/VMC/Ext/Blend/Apply",)
+    assert {name: round(weight, 6) for _, name, weight in face[:-1]} == {"aa": 0.7, "A": 0.7, "jawOpen": 0.4}
+    (eye,) = [message.params for message in messages if message.address == "/VMC/Ext/Set/Eye"]
+    # the performer's left is at -x in Unity's frame
+    np.testing.assert_allclose(eye, [1, -1.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_performer_without_face_sends_none() -> None:
+    addresses = {message.address for message in make_frame(FIGURE, np.zeros(3), AT_REST, 0.0)}
+    assert not any("Blend" in address or "Eye" in address for address in addresses)

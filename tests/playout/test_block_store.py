@@ -3,6 +3,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension.contact import encode_contacts
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneSamples
@@ -10,7 +12,7 @@ from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
 from bunraku.motion import rotation
 from bunraku.motion.skeleton import joint_and_tip_positions
-from bunraku.playout.block_store import MotionBlockStore, SceneBlockStore
+from bunraku.playout.block_store import ContactBlockStore, MotionBlockStore, SceneBlockStore
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera
 
@@ -135,6 +137,25 @@ def test_shorter_track_is_constant_past_its_end_and_longer_one_is_cut() -> None:
     assert seam is not None
     assert cut is not None
     assert np.abs(seam[0] - cut[0]).max() > 1e-6
-    (still,) = store.rotations_at([6_000_000], True, 8_000_000)
+    (still,) = store.poses_at([6_000_000], True, 8_000_000)
     assert still is not None
-    np.testing.assert_allclose(still, cut[1], atol=1e-12)
+    for values, expected in zip(still, cut, strict=True):
+        np.testing.assert_allclose(values, expected, atol=1e-12)
+
+
+def test_contacts_are_those_of_the_frame_that_began() -> None:
+    planted = np.stack([np.arange(120) % 3 == 0, np.arange(120) % 7 < 3], axis=1)
+    encoded = encode_contacts(planted, ENCODED.track)
+    store = ContactBlockStore(encoded.track)
+    assert store.contacts_at(0) is None
+    for index, block in enumerate(encoded.ladder[0].blocks):
+        assert store.put_encoded(index, 0, block)
+    for frame in range(120):
+        for position in (round(frame * 1e6 / 30), round((frame + 0.9) * 1e6 / 30)):
+            found = store.contacts_at(position)
+            assert found is not None
+            np.testing.assert_array_equal(found, planted[frame])
+    with pytest.raises(DamagedBlock):
+        store.put_encoded(0, 0, b"")
+    with pytest.raises(ValueError, match="does not belong"):
+        store.put_encoded(99, 0, encoded.ladder[0].blocks[0])

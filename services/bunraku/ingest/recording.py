@@ -36,7 +36,7 @@ MAX_ACTIVE_RECORDINGS = 8
 MAX_RECORDINGS_PER_SUBJECT = 2
 RECORDING_TIMEOUT_S = 100.0
 """Time limit of a recording, including the wait for a worker slot: the session service waits for 120 s."""
-INHERITED_FIELDS = ("profile", "joints", "rest_pose", "unit", "guessed", "fit", "extension", "tags")
+INHERITED_FIELDS = ("profile", "joints", "rest_pose", "unit", "guessed", "fit", "extension", "fingers", "face", "tags")
 """Members of a description that concern the skeleton, and the tags, copied from the played motion."""
 
 

@@ -6,13 +6,15 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from bunraku.codec.extension_track import ExtensionBlock, ExtensionTrack
+from bunraku.codec.extension.contact import ContactBlock, ContactTrack, decode_contact_block
+from bunraku.codec.extension.track import ExtensionBlock, ExtensionTrack
 from bunraku.codec.motion_decoder import MotionBlock
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import SceneBlock
 from bunraku.codec.timing import Timing
 from bunraku.motion import rotation
+from bunraku.motion.contact.foot_contact import BoolArray
 from bunraku.motion.rotation import Array
 
 Pose = tuple[Array, Array]
@@ -109,9 +111,9 @@ class MotionBlockStore(TrackBlockStore[MotionTrack, MotionBlock]):
             rotation.slerp(rotations[0], next_rotations[0], np.full(len(rotations[0]), mix)),
         )
 
-    def rotations_at(self, positions: list[int], loop: bool = True, duration: int | None = None) -> list[Array | None]:
-        """Return the rotations (18, 4) of `pose_at` at several motion times, for little more than the cost of one."""
-        found: list[Array | None] = [None] * len(positions)
+    def poses_at(self, positions: list[int], loop: bool = True, duration: int | None = None) -> list[Pose | None]:
+        """Return the poses of `pose_at` at several motion times, for little more than the cost of one."""
+        found: list[Pose | None] = [None] * len(positions)
         groups: dict[tuple[int, bool], tuple[MotionBlock, MotionBlock | None, list[int], list[float]]] = {}
         for nth, position in enumerate(positions):
             location = self._find_block(position, loop, duration)
@@ -122,20 +124,23 @@ class MotionBlockStore(TrackBlockStore[MotionTrack, MotionBlock]):
             members[2].append(nth)
             members[3].append(instant)
         for block, following, numbers, instants in groups.values():
-            for nth, rotations in zip(
-                numbers, _interpolate_rotations(block, following, np.array(instants)), strict=True
-            ):
-                found[nth] = rotations
+            roots, rotations = _interpolate_poses(block, following, np.array(instants))
+            for nth, root, pose in zip(numbers, roots, rotations, strict=True):
+                found[nth] = root, pose
         return found
 
 
-def _interpolate_rotations(block: MotionBlock, following: MotionBlock | None, instants: Array) -> Array:
-    """Return rotations (m, 18, 4) at `instants` (m,) of a block, or between its last frame and the following block."""
+def _interpolate_poses(block: MotionBlock, following: MotionBlock | None, instants: Array) -> tuple[Array, Array]:
+    """Return roots (m, 3) and rotations (m, 18, 4) at `instants` (m,) of a block, or between it and the following."""
     if following is None:
-        return block.pose_at(instants)[1]
-    last, first = block.pose_at(block.frames - 1.0)[1][0], following.pose_at(0.0)[1][0]
+        roots, rotations = block.pose_at(instants)
+        return roots, rotations
+    (last_root, last), (first_root, first) = block.pose_at(block.frames - 1.0), following.pose_at(0.0)
     mix = np.minimum(instants - (block.frames - 1), 1.0)
-    return rotation.slerp(last, first, np.repeat(mix[:, None], len(last), axis=1))
+    return (
+        last_root[0] + mix[:, None] * (first_root[0] - last_root[0]),
+        rotation.slerp(last[0], first[0], np.repeat(mix[:, None], len(last[0]), axis=1)),
+    )
 
 
 class _ValuesBlock(_Block, Protocol):
@@ -172,4 +177,27 @@ class SceneBlockStore(ValuesBlockStore[SceneTrack, SceneBlock]):
 
 
 class ExtensionBlockStore(ValuesBlockStore[ExtensionTrack, ExtensionBlock]):
-    """Decoded blocks of one extension: values (E, 3) of its joints."""
+    """Decoded blocks of one extension: values (E, 3) of its channels."""
+
+
+class ContactBlockStore(TrackBlockStore[ContactTrack, ContactBlock]):
+    """Decoded blocks of the contacts of one performer."""
+
+    def put_encoded(self, index: int, level: int, data: bytes) -> bool:
+        """Decode and store a block; return True if it was stored. Raises ValueError or `DamagedBlock`."""
+        if not 0 <= index < self.track.block_count:
+            raise ValueError(f"Block {index} does not belong to this track of {self.track.block_count} blocks")
+        return self.put(index, level, decode_contact_block(data, self.track.frames_in(index)))
+
+    def contacts_at(self, position: int) -> BoolArray | None:
+        """Return whether the left and the right foot are planted (2,) at motion time `position`, in microseconds.
+
+        A frame lasts until the next one. Returns None if the block is missing.
+        """
+        found = self._find_block(position, loop=False)
+        if found is None:
+            return None
+        first = self.track.first_frame(self.track.block_at(position))
+        frame = int((position + 1) * self.track.fps / 1e6) - first
+        planted: BoolArray = found[0].planted[min(max(frame, 0), found[0].frames - 1)]
+        return planted

@@ -8,15 +8,16 @@ from typing import Any
 
 from bunraku.codec.audio import parse_audio_track
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_track import EXTENSION_TYPE, parse_extension_track
+from bunraku.codec.extension.contact import parse_contact_track
+from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, parse_extension_track
 from bunraku.codec.motion_track import parse_motion_track
 from bunraku.codec.scene import parse_scene_track
 from bunraku.motion.placement import STAGE_CENTRE, Placement
 from bunraku.playout.audio_store import AudioBlockStore
-from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, SceneBlockStore
+from bunraku.playout.block_store import ContactBlockStore, ExtensionBlockStore, MotionBlockStore, SceneBlockStore
 from bunraku.wire.limbs import MAX_PERFORMERS
 
-AnyBlockStore = MotionBlockStore | SceneBlockStore | AudioBlockStore | ExtensionBlockStore
+AnyBlockStore = MotionBlockStore | SceneBlockStore | AudioBlockStore | ExtensionBlockStore | ContactBlockStore
 
 
 class TrackSet:
@@ -41,8 +42,10 @@ class TrackSet:
         """Bitrate of each level of the first performer, kbit/s."""
         self.scenes: list[SceneBlockStore] = []
         """Cameras and lights, in the Description's order."""
-        self.extensions: dict[int, ExtensionBlockStore] = {}
-        """Extensions by index of the performer."""
+        self.extensions: dict[tuple[int, ExtensionPart], ExtensionBlockStore] = {}
+        """Extensions by index and part of the performer."""
+        self.contacts: dict[int, ContactBlockStore] = {}
+        """Contacts of the feet by index of the performer."""
         self.audio: AudioBlockStore | None = None
         """Store of the first audio track that can be played, if any."""
         self.described_count = 0
@@ -66,9 +69,13 @@ class TrackSet:
                 elif track.get("type") in ("camera", "light"):
                     self._stores[number] = scene = SceneBlockStore(parse_scene_track(track))
                     self.scenes.append(scene)
+                elif track.get("type") == EXTENSION_TYPE and track.get("part") == ExtensionPart.CONTACTS:
+                    contacts = ContactBlockStore(parse_contact_track(track))
+                    self._stores[number] = self.contacts.setdefault(contacts.track.performer, contacts)
                 elif track.get("type") == EXTENSION_TYPE:
                     extension = ExtensionBlockStore(parse_extension_track(track))
-                    self._stores[number] = self.extensions.setdefault(extension.track.performer, extension)
+                    key = extension.track.performer, extension.track.part
+                    self._stores[number] = self.extensions.setdefault(key, extension)
                 elif track.get("type") == "audio" and self.audio is None:
                     self._stores[number] = self.audio = AudioBlockStore(
                         parse_audio_track(track, self.first_performer.track)

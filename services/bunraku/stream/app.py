@@ -10,7 +10,7 @@ from fastapi import FastAPI, Query, Response, WebSocket
 from starlette.websockets import WebSocketDisconnect
 
 from bunraku.codec.container import StoredMotion
-from bunraku.codec.extension_track import EXTENSION_TYPE
+from bunraku.codec.extension.track import ExtensionPart
 from bunraku.delivery.resume import ResumeState
 from bunraku.http import problem_details
 from bunraku.http.access_control import Role, access_of, requires
@@ -38,6 +38,7 @@ IMMUTABLE_HEADERS = {"Cache-Control": "public, max-age=31536000, immutable"}
 LevelQuery = Annotated[int | None, Query(ge=0, le=15)]
 TracksQuery = Annotated[str, Query(max_length=64)]
 ExtensionsQuery = Annotated[bool, Query()]
+PartsQuery = Annotated[str, Query(max_length=100)]
 ResumeQuery = Annotated[str, Query(max_length=400)]
 MAX_RESUME_AGE_US = 60_000_000
 """A viewer may date the start of its timeline back or ahead by at most this, microseconds."""
@@ -97,6 +98,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         rate: LevelQuery = None,
         tracks: TracksQuery = "",
         extensions: ExtensionsQuery = False,
+        parts: PartsQuery = "",
         have: ResumeQuery = "",
         at: float = 0.0,
         clock_at: Annotated[int | None, Query(alias="clock")] = None,
@@ -104,7 +106,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         try:
             options = ViewerOptions(
                 rate,
-                _parse_track_types(tracks, extensions),
+                _parse_track_types(tracks, extensions, parts),
                 has_own_timeline=True,
                 resume_state=_parse_resume_state(have),
             )
@@ -138,11 +140,12 @@ def create_app(context: ServiceContext) -> FastAPI:
         rate: LevelQuery = None,
         tracks: TracksQuery = "",
         extensions: ExtensionsQuery = False,
+        parts: PartsQuery = "",
         have: ResumeQuery = "",
     ) -> None:
         try:
             options = ViewerOptions(
-                rate, _parse_track_types(tracks, extensions), resume_state=_parse_resume_state(have)
+                rate, _parse_track_types(tracks, extensions, parts), resume_state=_parse_resume_state(have)
             )
             viewer = ViewerConnection(stream, options)
             try:
@@ -221,9 +224,10 @@ def _parse_resume_state(have: str) -> ResumeState | None:
         raise CloseConnection(subprotocol.POLICY_VIOLATION, "Unreadable query", str(error)) from None
 
 
-def _parse_track_types(tracks: str, extensions: bool) -> tuple[str, ...]:
+def _parse_track_types(tracks: str, extensions: bool, parts: str) -> tuple[str, ...]:
     """Parse the `tracks` parameter; all types if it is empty. Extensions are sent if they are asked for.
 
+    Those of the body are, or the `parts` that are named; unknown parts are ignored, as later releases may have more.
     Raise `CloseConnection` for an unknown type.
     """
     selected = tuple(name for name in tracks.split(",") if name)
@@ -234,4 +238,6 @@ def _parse_track_types(tracks: str, extensions: bool) -> tuple[str, ...]:
             "Unknown track",
             f"{unknown[0]!r} is not a type of track; use {', '.join(TRACK_TYPES)}",
         )
-    return (selected or TRACK_TYPES) + ((EXTENSION_TYPE,) if extensions else ())
+    named = parts.split(",") if parts else [ExtensionPart.BODY]
+    chosen = tuple(part.value for part in ExtensionPart if extensions and part in named)
+    return (selected or TRACK_TYPES) + chosen

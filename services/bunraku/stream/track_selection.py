@@ -7,17 +7,19 @@ from dataclasses import dataclass
 
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.container import StoredMotion, Track
-from bunraku.codec.extension_track import ExtensionTrack
+from bunraku.codec.extension.contact import ContactTrack
+from bunraku.codec.extension.track import ExtensionTrack
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SCENE_CHANNEL_COUNT, SceneTrack
 from bunraku.delivery import allocation
 from bunraku.delivery.block_scheduler import ScheduledTrack
 from bunraku.delivery.resume import ResumeState
+from bunraku.motion.contact.foot_contact import FEET
 from bunraku.motion.skeleton import CHANNEL_COUNT
 from bunraku.wire.messages import Description, unpack
 
 TRACK_TYPES = ("motion", "audio", "camera", "light")
-"""Types of tracks that a viewer may request by name, and is sent by default; extensions have their own parameter."""
+"""Types of tracks that a viewer may request by name, and is sent by default; extensions have their own parameters."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +29,7 @@ class ViewerOptions:
     pinned_level: int | None = None
     """Bitrate level of the motion to keep to; None to adapt it."""
     track_types: tuple[str, ...] = TRACK_TYPES
-    """Types of the tracks whose blocks are sent."""
+    """Types of the tracks, and parts of the extensions, whose blocks are sent."""
     has_own_timeline: bool = False
     """True for a viewer of a stored motion, who may edit the timeline."""
     resume_state: ResumeState | None = None
@@ -91,8 +93,13 @@ def _count_track_channels(track: Track) -> int:
         return track.channels
     if isinstance(track, ExtensionTrack):
         return len(track.layout.axes)
+    if isinstance(track, ContactTrack):
+        return len(FEET)
     return SCENE_CHANNEL_COUNT if isinstance(track, SceneTrack) else CHANNEL_COUNT
 
 
 def _track_type(track: Track) -> str:
+    """Return the type of a track, of an extension its part."""
+    if isinstance(track, ExtensionTrack | ContactTrack):
+        return track.part.value
     return "motion" if isinstance(track, MotionTrack) else track.kind

@@ -20,7 +20,7 @@ from tests.vectors.scene import sample_camera
 
 @pytest.fixture(scope="module")
 def stored() -> StoredMotion:
-    encoded = encode_motion(random_motion(2.0, 30.0, 9), error_bounds_mm=(30.0, 5.0), grade="live", first_seconds=0.5)
+    encoded = encode_motion(random_motion(2.0, 30.0, 9), 0.7, (30.0, 5.0), grade="live", first_seconds=0.5)
     return container.unpack_motion(
         "one", pack_motion("one", encoded, [encode_scene(sample_camera(2.0, 30.0), error_bounds_mm=(20.0,))])
     )

@@ -8,8 +8,9 @@ import pytest
 from bunraku.codec import container
 from bunraku.codec.audio import AudioTrack, unpack_audio_block
 from bunraku.codec.container import PerformerTracks, StoredMotion, pack_motion, unpack_motion
-from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import ExtensionTrack, decode_extension_block
+from bunraku.codec.extension.contact import ContactTrack, decode_contact_block
+from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.track import Extension, ExtensionTrack, decode_extension_block
 from bunraku.codec.motion_encoder import ERROR_BOUNDS_MM, encode_motion
 from bunraku.codec.scene import SceneSamples, SceneTrack
 from bunraku.codec.scene_encoder import encode_scene
@@ -18,7 +19,8 @@ from bunraku.ingest.jobs.edit import cut_performer, cut_scene, edit_motion, samp
 from bunraku.ingest.result import JobResult
 from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
-from bunraku.motion.mirror import OPPOSITE_JOINTS, mirror_extension
+from bunraku.motion.extension import BodyExtension
+from bunraku.motion.mirror import OPPOSITE_JOINTS, mirror_body, mirror_face, mirror_hands
 from bunraku.motion.placement import Placement
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, TIP_JOINTS, joint_and_tip_positions
@@ -26,7 +28,9 @@ from bunraku.wire.messages import Data
 from tests.audio import decode_opus, make_tone, write_audio
 from tests.ingest.jobs.motions import MOTIONS
 from tests.motion.extended_source import extended_source
+from tests.motion.synthetic_motion import stepping_motion
 from tests.vectors.blocks import random_motion
+from tests.vectors.hands_face import make_face, make_hands
 from tests.vectors.scene import sample_camera
 
 FPS, SECONDS = 30.0, 3.0
@@ -215,10 +219,11 @@ def test_extension_is_edited_with_its_motion(mirror: bool, loop: bool) -> None:
     edited = unpack_motion("y", result.packed)
     track = edited.tracks[1]
     assert isinstance(track, ExtensionTrack)
+    assert isinstance(track.extension, BodyExtension)
     assert (track.frames, track.performer) == (45, 0)
     expected, values = analysis.extension.extension, analysis.extension.values[30:75]
     if mirror:
-        expected, values = mirror_extension(expected, values)
+        expected, values = mirror_body(expected, values)
     np.testing.assert_allclose(track.extension.drive, expected.drive, atol=1e-9)
     decoded = np.concatenate(
         [
@@ -228,3 +233,47 @@ def test_extension_is_edited_with_its_motion(mirror: bool, loop: bool) -> None:
     )
     unblended = slice(0, 20 if loop else 45)
     np.testing.assert_allclose(decoded[unblended], values[unblended], atol=0.05)
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_fingers_and_face_are_edited_with_their_motion(mirror: bool) -> None:
+    encoded = encode_motion(random_motion(3.0, 30.0, 5), error_bounds_mm=(5.0,), grade="live")
+    hands, turns = make_hands(1, (3, 2, 3, 3, 3, 3, 3, 3, 3, 0), 90)
+    face, weights = make_face(2, ["jawLeft", "eyeBlinkLeft", "aa", "gazeYaw"], 90)
+    extensions = [
+        encode_extension(each, values, encoded.track, [1.0]) for each, values in ((hands, turns), (face, weights))
+    ]
+    stored = unpack_motion("x", pack_motion("x", encoded, extensions=extensions))
+    result = edit_motion("y", stored, 30, 75, mirror, False)
+    assert isinstance(result, JobResult)
+    edited = unpack_motion("y", result.packed)
+    shown: list[tuple[Extension, Array]] = [(hands, turns[30:75]), (face, weights[30:75])]
+    if mirror:
+        shown = [mirror_hands(hands, turns[30:75]), mirror_face(face, weights[30:75])]
+    for number, (extension, values) in enumerate(shown, 1):
+        track = edited.tracks[number]
+        assert isinstance(track, ExtensionTrack)
+        assert track.extension.names == extension.names
+        decoded = np.concatenate(
+            [
+                decode_extension_block(track, data).values_at(np.arange(float(track.frames_in(index))))
+                for index, data in enumerate(edited.blocks(number)[-1])
+            ]
+        )
+        assert np.sqrt(np.square(decoded - values).mean()) < 0.06
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_part_has_the_contacts_of_its_own_feet(mirror: bool) -> None:
+    encoded = encode_motion(stepping_motion(90), error_bounds_mm=(5.0,), grade="live")
+    edited, result = edit(unpack_motion("x", pack_motion("x", encoded)), 20, 60, mirror)
+    assert result.description["tracks"] == ["motion", "extension"]
+    track = edited.tracks[1]
+    assert isinstance(track, ContactTrack)
+    planted = np.concatenate(
+        [decode_contact_block(data, track.frames_in(index)).planted for index, data in enumerate(edited.blocks(1)[0])]
+    )
+    lifted, standing = planted[:, 1 - mirror], planted[:, int(mirror)]
+    assert standing.all()
+    assert not lifted[14:36].any()
+    assert lifted[:8].all()

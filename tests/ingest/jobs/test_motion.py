@@ -1,14 +1,17 @@
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import msgpack
 import numpy as np
 import pytest
 
 from bunraku.codec.container import unpack_motion
-from bunraku.codec.extension_track import ExtensionTrack
+from bunraku.codec.extension.track import ExtensionTrack
 from bunraku.ingest.jobs.motion import encode_file, list_file_takes
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.motion.readers.takes import TakeList
@@ -49,7 +52,7 @@ def test_invalid_file_is_rejected_with_a_hint(tmp_path: Path) -> None:
 def test_bone_that_is_too_long_is_rejected_with_a_hint(joint: str, tmp_path: Path) -> None:
     dance = extended_source(20)
     places = dance.rest_positions.copy()
-    places[dance.names.index(joint) : dance.names.index("Head") + 1, 1] += 5.0
+    places[dance.names.index(joint) : dance.names.index("Head") + 1, 1] += 8.0
     source = tmp_path / "source"
     source.write_bytes(write_source_bvh(replace(dance, rest_positions=places)))
     rejected = encode_file("m1", source)
@@ -90,3 +93,29 @@ def test_takes_are_listed(tmp_path: Path) -> None:
     assert list_file_takes(source, 2) == TakeList(["walk", "run"], 3)
     source.write_bytes(b"PK\x03\x04" + bytes(100))
     assert isinstance(list_file_takes(source, 2), JobRejection)
+
+
+def test_jobs_compile_nothing_that_is_not_compiled_with_their_module() -> None:
+    # a job runs in a sandbox, in which nothing compiled can be kept
+    script = """
+import sys
+from pathlib import Path
+from bunraku.ingest.jobs import motion
+from bunraku.codec import _kernels
+from tests.motion.hand_source import hand_source
+from tests.motion.readers.faces import FaceGlb
+from tests.motion.readers.sources import write_glb
+import numpy as np
+kernels = [each for name in _kernels.__all__ if hasattr(each := getattr(_kernels, name), "signatures")]
+before = [list(kernel.signatures) for kernel in kernels]
+face = FaceGlb(write_glb(hand_source(75)))
+face.add_morphs({"jawOpen": np.linspace(0.0, 1.0, 75), "eyeBlinkLeft": np.linspace(1.0, 0.0, 75)}, 30.0)
+path = Path(sys.argv[1])
+path.write_bytes(face.pack())
+assert motion.encode_file("m", path).description["tracks"] == ["motion", "extension", "extension", "extension"]
+print([kernel.__name__ for kernel, known in zip(kernels, before) if kernel.signatures != known])
+"""
+    with TemporaryDirectory() as folder:
+        command = [sys.executable, "-c", script, f"{folder}/acted.glb"]
+        found = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert found.stdout.strip() == "[]", found.stderr

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bunraku.codec.container import unpack_motion
+from bunraku.codec.extension.contact import ContactTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.ingest.jobs.performance import encode_performance, read_samples, sample_evenly
 from bunraku.ingest.result import JobRejection, JobResult
@@ -90,3 +91,12 @@ def test_performance_without_movement_in_time_is_rejected(count: int) -> None:
     rejection = encode_performance("motion", HEADER, parts)
     assert isinstance(rejection, JobRejection)
     assert rejection.title == "Nothing to keep"
+
+
+def test_performer_who_stands_has_contacts() -> None:
+    standing = np.array([0.0, 0.824, 0.0]), pose_at(BEGIN_US)[1] * 0 + [1.0, 0.0, 0.0, 0.0]
+    samples = [pack_sample(BEGIN_US + round(k * 1e6 / 60), standing).pack() for k in range(60)]
+    result = encode_performance("motion", HEADER, [b"".join(samples)])
+    assert isinstance(result, JobResult)
+    assert result.description["tracks"] == ["motion", "extension"]
+    assert isinstance(unpack_motion("motion", result.packed).tracks[1], ContactTrack)

@@ -4,7 +4,8 @@ import numpy as np
 
 from bunraku.codec import container
 from bunraku.codec.container import StoredMotion
-from bunraku.codec.extension_encoder import encode_extension
+from bunraku.codec.extension.contact import ContactTrack
+from bunraku.codec.extension.encoder import encode_extension
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
@@ -25,6 +26,7 @@ from bunraku.wire.messages import Data
 from bunraku.wire.overlay import Overlay
 from tests.ingest.jobs.motions import MOTIONS, PLACEMENTS, SECOND_US, START_CLOCK_US, make_log
 from tests.motion.extended_source import extended_source
+from tests.motion.synthetic_motion import stepping_motion
 
 
 def load_blocks(name: str) -> MotionBlockStore:
@@ -96,7 +98,7 @@ def test_all_performers_are_recorded_with_their_overlays() -> None:
         marionettes.ownership.apply_input("ada", LimbInput(4, 1, 1, frame + 1, now, (0.7, 0.3, 0.3)), now)
         poses = replay.motion_poses_at(now + 60_000)
         assert poses is not None
-        overlay = marionettes.compute_overlay([rotations for _, rotations in poses], now)
+        overlay = marionettes.compute_overlay(poses, now)
         limbs = {limb: pack_joints(joints) for limb, joints in overlay.items()}
         log.add_message(now + 60_000, Overlay(frame, now + 60_000, limbs).pack())
     result = encode_recording(
@@ -233,3 +235,16 @@ def test_recording_has_the_extension_as_it_was_shown() -> None:
         clock = START_CLOCK_US + round(frame * 1e6 / 60)
         apart = recorded.values_at(played, clock) - original.values_at(sought, clock)
         assert np.abs(apart).max() < 0.02
+
+
+def test_recording_has_the_contacts_of_what_was_shown() -> None:
+    encoded = encode_motion(stepping_motion(90), error_bounds_mm=(5.0,), grade="live")
+    stored = container.unpack_motion("x", container.pack_motion("x", encoded))
+    one = timeline.start("x", 3 * SECOND_US, START_CLOCK_US)
+    request = RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 2 * SECOND_US)
+    result = encode_recording("recorded", request, make_log(one), {"x": stored})
+    assert isinstance(result, JobResult)
+    assert result.description["tracks"] == ["motion", "extension"]
+    track = container.unpack_motion("recorded", result.packed).tracks[1]
+    assert isinstance(track, ContactTrack)
+    assert (track.frames, track.fps) == (120, 60.0)

@@ -63,11 +63,11 @@ class SimulatedSession:
         for back in (2 * TICK_US, TICK_US) if self._was_at_rest else ():
             before = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US - back)
             assert before is not None
-            self.marionettes.observe_poses([rotations for _, rotations in before], self.clock - back)
+            self.marionettes.observe_poses(before, self.clock - back)
         self._was_at_rest = False
         poses = self._replay().motion_poses_at(self.clock + OVERLAY_LEAD_US)
         assert poses is not None
-        overlay = self.marionettes.compute_overlay([rotations for _, rotations in poses], self.clock)
+        overlay = self.marionettes.compute_overlay(poses, self.clock)
         limbs = {limb: pack_joints(joints) for limb, joints in overlay.items()}
         self._sequence += 1
         published = Overlay(self._sequence, self.clock + OVERLAY_LEAD_US, limbs)

@@ -14,8 +14,9 @@ import numpy as np
 
 from bunraku.codec.audio import SAMPLE_RATE, AudioTrack, EncodedAudio, cut_audio
 from bunraku.codec.container import PerformerTracks, StoredMotion, pack_motion
-from bunraku.codec.extension_encoder import EncodedExtension, encode_extension
-from bunraku.codec.extension_track import ExtensionTrack, decode_extension_block
+from bunraku.codec.extension.contact import EncodedContacts
+from bunraku.codec.extension.encoder import EncodedExtension, encode_extension
+from bunraku.codec.extension.track import Extension, ExtensionTrack, decode_extension_block
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import EncodedMotion
 from bunraku.codec.scene import (
@@ -28,9 +29,20 @@ from bunraku.codec.scene import (
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
 from bunraku.codec.timing import Timing
-from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_motions
+from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_foot_contacts, encode_motions
 from bunraku.ingest.result import JobRejection, JobResult
-from bunraku.motion.mirror import mirror_extension, mirror_heading, mirror_motion, mirror_placement, mirror_vectors
+from bunraku.motion.extension import BodyExtension
+from bunraku.motion.face import Face
+from bunraku.motion.hands import Hands
+from bunraku.motion.mirror import (
+    mirror_body,
+    mirror_face,
+    mirror_hands,
+    mirror_heading,
+    mirror_motion,
+    mirror_placement,
+    mirror_vectors,
+)
 from bunraku.motion.rotation import Array
 from bunraku.motion.seamless_loop import BLEND_S, close_loop, close_value_loop
 from bunraku.motion.skeleton import Motion
@@ -61,7 +73,7 @@ def edit_motion(
         for performer, each in zip(stored.performers, encode_motions(motions, on_progress), strict=True)
     ]
     scenes: list[EncodedScene] = []
-    extensions: list[EncodedExtension] = []
+    extensions: list[EncodedExtension | EncodedContacts] = []
     audio: EncodedAudio | None = None
     for number, track in enumerate(stored.tracks):
         if isinstance(track, SceneTrack):
@@ -69,12 +81,13 @@ def edit_motion(
             scenes.append(encode_scene(_mirror_scene(scene) if mirror else scene, first_seconds=FIRST_BLOCK_S))
         elif isinstance(track, ExtensionTrack):
             values = cut_extension(track, stored.blocks(number)[-1], start_s, duration_s, loop)
-            extension, values = mirror_extension(track.extension, values) if mirror else (track.extension, values)
+            extension, values = _mirror_extension(track.extension, values) if mirror else (track.extension, values)
             motion = encoded[track.performer]
             errors_mm = [level.mean_error_mm for level in motion.ladder]
             extensions.append(encode_extension(extension, values, motion.track, errors_mm, track.performer))
         elif isinstance(track, AudioTrack):
             audio = cut_audio(track, stored.blocks(number), encoded[0].track, round(start_s * SAMPLE_RATE))
+    extensions += encode_foot_contacts(motions, encoded)
     description: dict[str, Any] = {
         **describe_encoding(motions[0], encoded[0]),
         "ladders": [each.describe()["rates"] for each in encoded],
@@ -112,6 +125,16 @@ def cut_extension(track: ExtensionTrack, blocks: list[bytes], start_s: float, du
         ]
     )
     return close_value_loop(values, earlier, earlier + count, track.fps) if loop else values
+
+
+def _mirror_extension(extension: Extension, values: Array) -> tuple[Extension, Array]:
+    match extension:
+        case BodyExtension():
+            return mirror_body(extension, values)
+        case Hands():
+            return mirror_hands(extension, values)
+        case Face():
+            return mirror_face(extension, values)
 
 
 def _instants_of(timing: Timing, start_s: float, duration_s: float, loop: bool) -> tuple[Array, int, int]:

@@ -1,4 +1,7 @@
-"""Encoding of motions by jobs: on all processors, with progress, and with as much effort as their length allows."""
+"""Encoding of motions by jobs: on all processors, with progress, and with as much effort as their length allows.
+
+Contacts of feet are detected in every motion that is encoded.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
 from typing import Any
 
+from bunraku.codec.extension.contact import EncodedContacts, encode_contacts
 from bunraku.codec.motion_encoder import EncodedMotion, EncodingGrade, encode_motion
+from bunraku.motion.contact.foot_contact import detect_contacts
 from bunraku.motion.skeleton import Motion
 
 FIRST_BLOCK_S = 0.5
@@ -33,6 +38,16 @@ def encode_motions(motions: Sequence[Motion], on_progress: Callable[[float], Non
                 motion, first_seconds=FIRST_BLOCK_S, grade=grade, on_progress=report_progress, map_levels=pool.map
             )
             finished += 1
+
+
+def encode_foot_contacts(motions: Sequence[Motion], encoded: Sequence[EncodedMotion]) -> list[EncodedContacts]:
+    """Return the contacts of each performer's feet in the blocks of its motion, without performers that have none."""
+    detected = [detect_contacts(motion) for motion in motions]
+    return [
+        encode_contacts(planted, each.track, performer)
+        for performer, (planted, each) in enumerate(zip(detected, encoded, strict=True))
+        if planted.any()
+    ]
 
 
 def describe_encoding(motion: Motion, encoded: EncodedMotion) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from bunraku.codec.container import pack_motion
-from bunraku.ingest.jobs.encoding import describe_encoding, encode_motions
+from bunraku.ingest.jobs.encoding import describe_encoding, encode_foot_contacts, encode_motions
 from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.motion.skeleton import Figure, Motion
 from bunraku.playout.block_store import Pose
@@ -30,7 +30,14 @@ def encode_performance(
         return JobRejection(NOTHING_TO_KEEP, f"the performance has {len(samples)} samples")
     motion = sample_evenly(header.figure, header.fps, samples)
     (encoded,) = encode_motions([motion], on_progress)
-    return JobResult(pack_motion(motion_id, encoded), describe_encoding(motion, encoded))
+    contacts = encode_foot_contacts([motion], [encoded])
+    return JobResult(
+        pack_motion(motion_id, encoded, extensions=contacts),
+        {
+            **describe_encoding(motion, encoded),
+            **({"tracks": ["motion", *(each.track.kind for each in contacts)]} if contacts else {}),
+        },
+    )
 
 
 def read_samples(parts: Sequence[bytes]) -> list[Sample]:

@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from bunraku.codec.container import StoredMotion, pack_motion
-from bunraku.codec.extension_encoder import EncodedExtension, encode_extension
+from bunraku.codec.extension.contact import EncodedContacts
+from bunraku.codec.extension.encoder import EncodedExtension, encode_extension
 from bunraku.codec.motion_encoder import EncodedMotion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
-from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_motions
+from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_foot_contacts, encode_motions
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay, extensions_of
 from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
@@ -64,7 +65,10 @@ def encode_recording(
         replace(each, front=performer.front, placement=performer.placement)
         for performer, each in zip(played.performers, encode_motions(recorded, on_progress), strict=True)
     ]
-    extensions = _record_extensions(session, played, times, [encoded, *others])
+    extensions: list[EncodedExtension | EncodedContacts] = [
+        *_record_extensions(session, played, times, [encoded, *others]),
+        *encode_foot_contacts(recorded, [encoded, *others]),
+    ]
     return JobResult(
         pack_motion(motion_id, encoded, scenes, others, extensions),
         {

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from bunraku.codec.container import PerformerTracks, StoredMotion
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_track import ExtensionTrack, decode_extension_block
+from bunraku.codec.extension.track import ExtensionTrack, decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.motion.rotation import Array

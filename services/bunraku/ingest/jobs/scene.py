@@ -36,7 +36,8 @@ def sample_keyframes(kind: SceneKind, keyframes: Keyframes, duration_us: int) ->
     following = np.clip(np.searchsorted(key_times, times, side="right"), 1, len(key_times) - 1)
     start = key_times[following - 1]
     share: Array = np.clip((times - start) / (key_times[following] - start), 0.0, 1.0)
-    share = np.where(is_smooth[following], minimum_jerk(share), share)[:, None]
+    # rounding lets an eased share exceed one
+    share = np.where(is_smooth[following], np.minimum(minimum_jerk(share), 1.0), share)[:, None]
     return SceneSamples(kind, SCENE_FPS, values[following - 1] + share * (values[following] - values[following - 1]))
 
 
