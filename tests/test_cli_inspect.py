@@ -3,11 +3,17 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from bunraku import cli_inspect
 from bunraku.cli import app
+from bunraku.motion.readers.bvh import parse_bvh
+from tests.motion.extended_source import write_source_bvh
+from tests.motion.hand_source import hand_source
+from tests.motion.readers.faces import build_face_fbx
+from tests.motion.readers.fbx_tree import to_binary
 from tests.motion.readers.fbx_writer import write_fbx
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
 
@@ -38,6 +44,28 @@ def test_json_has_everything(dance: Path) -> None:
     assert document["mapping"]["r_wrist"] == "r_wrist"
     assert document["fit"]["joints_mm"]["l_elbow"] < 1.0
     assert (document["fps"], document["frames"], document["unit"]) == (30.0, 20, "cm")
+
+
+def test_fingers_and_expressions_are_shown(tmp_path: Path) -> None:
+    path = tmp_path / "performer.fbx"
+    source = parse_bvh(write_source_bvh(hand_source(20)))
+    weights = np.linspace(0.0, 1.0, 20)
+    path.write_bytes(to_binary(build_face_fbx(source, {"jawOpen": weights, "tail": weights})))
+    shown = RUN.invoke(app, ["inspect", str(path)])
+    assert shown.exit_code == 0, shown.output
+    assert "LeftHandIndex1  l_metacarpophalangeal_2" in shown.stdout
+    assert "fingers: left hand 5 with 15 joints, right hand 5 with 15 joints; 0." in shown.stdout
+    assert "expressions: jawOpen" in shown.stdout
+    assert "left out: 'tail'" in shown.stdout
+    document = json.loads(RUN.invoke(app, ["inspect", str(path), "--json"]).stdout)
+    assert document["fingers"]["joints"]["r_metacarpophalangeal_5"] == "RightHandPinky1"
+    assert document["fingers"]["fit"]["mean_mm"] < 1.0
+    assert document["expressions"] == ["jawOpen"]
+
+
+def test_file_without_fingers_and_face_says_so_in_json(dance: Path) -> None:
+    document = json.loads(RUN.invoke(app, ["inspect", str(dance), "--json"]).stdout)
+    assert (document["fingers"], document["expressions"]) == (None, [])
 
 
 def test_take_is_chosen(tmp_path: Path) -> None:

@@ -171,14 +171,22 @@ def _print_motion(motion: dict[str, Any]) -> None:
     table.add_row("id", motion["id"])
     table.add_row("length", f"{motion['duration']:.2f} s, {motion['frames']} frames at {motion['fps']:g} fps")
     table.add_row("joints", f"{len(motion['joints'])} of 18, names: {motion['profile']}")
-    table.add_row("fit", f"{motion['fit']['mean_mm']:.1f} mm mean, {motion['fit']['max_mm']:.1f} mm maximum")
+    table.add_row("fit", _describe_fit(motion["fit"]))
     if extension := motion.get("extension"):
         table.add_row("extended", ", ".join(extension["joints"]))
-        table.add_row("", f"{extension['fit']['mean_mm']:.1f} mm mean, {extension['fit']['max_mm']:.1f} mm maximum")
+        table.add_row("", _describe_fit(extension["fit"]))
+    if fingers := motion.get("fingers"):
+        table.add_row("fingers", f"{len(fingers['joints'])} joints, {_describe_fit(fingers['fit'])}")
+    if face := motion.get("face"):
+        table.add_row("face", f"{len(face['expressions'])} expressions")
     table.add_row("rates", ", ".join(f"{rate['kbps']:.1f} kbit/s" for rate in motion["rates"]))
     for assumption in motion["guessed"]:
         table.add_row("assumed", assumption)
     out.print(table)
+
+
+def _describe_fit(fit: dict[str, float]) -> str:
+    return f"{fit['mean_mm']:.1f} mm mean, {fit['max_mm']:.1f} mm maximum"
 
 
 def _print_takes(stored: dict[str, Any]) -> None:

@@ -14,11 +14,14 @@ from bunraku.terminal import JsonOption, err, out
 
 if TYPE_CHECKING:
     from bunraku.motion.analysis import Analysis
+    from bunraku.motion.hands import Hands
     from bunraku.motion.source_motion import SourceMotion
 
 MAX_FILE_BYTES = 64 << 20
 MAX_TREE_JOINTS = 200
 """Joints that are printed; JSON has all."""
+MAX_EXPRESSIONS = 12
+"""Expressions that are printed; JSON has all."""
 POOR_JOINT_MM = 25.0
 """Mean distance above which a joint is marked."""
 
@@ -69,6 +72,8 @@ def _describe(source: SourceMotion, analysis: Analysis) -> dict[str, Any]:
             "joints_mm": {joint: round(each.mean_mm, 3) for joint, each in analysis.joint_fits.items()},
         },
         "extension": _describe_extension(source, analysis),
+        "fingers": _describe_fingers(source, analysis),
+        "expressions": list(analysis.face.face.names) if analysis.face is not None else [],
         "guessed": analysis.assumptions,
     }
 
@@ -85,6 +90,20 @@ def _describe_extension(source: SourceMotion, analysis: Analysis) -> dict[str, A
         "fit": {
             "mean_mm": round(analysis.extended_mean_error_mm, 3),
             "max_mm": round(analysis.extended_max_error_mm, 3),
+        },
+    }
+
+
+def _describe_fingers(source: SourceMotion, analysis: Analysis) -> dict[str, Any] | None:
+    """Return the joints of the fingers, and their fit; None if no finger moves."""
+    hands = analysis.hands
+    if hands is None:
+        return None
+    return {
+        "joints": dict(zip(hands.hands.names, (source.names[joint] for joint in hands.sources), strict=True)),
+        "fit": {
+            "mean_mm": round(analysis.hands_mean_error_mm, 3),
+            "max_mm": round(analysis.hands_max_error_mm, 3),
         },
     }
 
@@ -110,8 +129,27 @@ def _print(source: SourceMotion, analysis: Analysis) -> None:
             f"{analysis.extended_max_error_mm:.1f} mm maximum",
             highlight=False,
         )
+    if analysis.hands is not None:
+        out.print(
+            f"fingers: {_count_fingers(analysis.hands.hands)}; {analysis.hands_mean_error_mm:.1f} mm mean, "
+            f"{analysis.hands_max_error_mm:.1f} mm maximum",
+            highlight=False,
+        )
+    if analysis.face is not None:
+        names = analysis.face.face.names
+        more = f" and {len(names) - MAX_EXPRESSIONS} more" if len(names) > MAX_EXPRESSIONS else ""
+        out.print(f"expressions: {', '.join(names[:MAX_EXPRESSIONS])}{more}", highlight=False)
     for assumption in analysis.assumptions:
         out.print(f"assumed: {assumption}", highlight=False)
+
+
+def _count_fingers(hands: Hands) -> str:
+    """Return how many fingers and joints each hand has."""
+    size = len(hands.counts) // 2
+    sides = ("left", hands.counts[:size]), ("right", hands.counts[size:])
+    return ", ".join(
+        f"{side} hand {sum(count > 0 for count in counts)} with {sum(counts)} joints" for side, counts in sides
+    )
 
 
 def _skeleton_tree(source: SourceMotion, analysis: Analysis) -> Tree:
@@ -120,6 +158,9 @@ def _skeleton_tree(source: SourceMotion, analysis: Analysis) -> Tree:
     if analysis.extension is not None:
         names = analysis.extension.extension.names
         mapped = {joint: (name, None) for joint, name in zip(analysis.extension.sources, names, strict=True)}
+    if analysis.hands is not None:
+        fingers = zip(analysis.hands.sources, analysis.hands.hands.names, strict=True)
+        mapped |= {joint: (name, None) for joint, name in fingers}
     mapped |= {each.source: (joint, each.mean_mm) for joint, each in analysis.joint_fits.items()}
     root = Tree(_joint_label(source.names[0], mapped.get(0)))
     trees = [root]

@@ -6,7 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from bunraku.wire.messages import Alive, Ask, Claim, Edit, Input, Message, Ping, Release
+from bunraku.wire.messages import Alive, Ask, Bond, Claim, Edit, Input, Message, Ping, Release
 from tests.attack.attack_socket import BINARY, CALM, CLOSED_1008, MAX_WRITE_DEADLINE_S, PING, flood_and_read, repeat
 from tests.attack.raw_socket import RawSocket, connect_websocket, frame
 from tests.attack.registry import Report, Target, attack
@@ -60,6 +60,11 @@ _control_flood(
     "requests_for_a_held_limb",
     "Flood a control connection with requests for a held limb and their withdrawals.",
     _messages(lambda number: Ask(0, bool(number & 1))),
+)
+_control_flood(
+    "bonds_of_all_limbs",
+    "Flood a control connection with requests for bonds of all limbs and their ends.",
+    _messages(lambda number: Bond([number % 16, number // 16 % 16], bool(number & 1))),
 )
 _control_flood(
     "keep_alive_messages",

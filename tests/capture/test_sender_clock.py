@@ -28,8 +28,10 @@ def test_times_follow_the_sender_at_the_least_delay(
     local = np.array([clock.to_local(t * (1.0 + drift) + offset_s, a) for t, a in zip(sampled, arrivals, strict=True)])
     settled = sampled > SETTLING_S + 1.0
     assert np.abs(np.diff(local[settled]) * fps - 1.0).max() <= MAX_SLEW + MAX_DRIFT + 1e-6
-    # never later than the arrival, never earlier than the sampling by more than the estimate may err
-    assert (local <= arrivals + 1e-3).all()
+    # never later than the arrival, but for a least delay that is seen after the offset may be followed at once
+    late_s = (arrivals - sampled)[sampled < SETTLING_S - 0.05].min() - 0.005
+    assert (local <= arrivals + 1e-3 + late_s).all()
+    # never earlier than the sampling by more than the estimate may err
     assert np.abs(local[settled] - sampled[settled] - 0.005).max() < 0.004 + jitter_s
 
 

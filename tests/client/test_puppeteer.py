@@ -105,3 +105,41 @@ async def test_a_held_limb_is_asked_for_and_given(server: str, clip_file: Path) 
                 while ben.notice is None:  # noqa: ASYNC110
                     await asyncio.sleep(0.01)
             assert (ben.notice.limb, ben.notice.reason) == (0, "reach")
+
+
+async def test_both_hands_are_bonded_moved_together_and_let_go(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream?rate=3"))
+        shown: list[Pose] = []
+
+        def do_hands_touch() -> bool:
+            if viewer.statistics.overlays <= 10:
+                return False
+            assert viewer.track is not None
+            position, orientation = world_transforms(viewer.track.figure, *shown[-1])
+            tips = [
+                position[wrist] + rotation.rotate(orientation[wrist], viewer.track.figure.tips[wrist])
+                for wrist in (JOINT_INDEX["l_wrist"], JOINT_INDEX["r_wrist"])
+            ]
+            return float(np.linalg.norm(tips[0] - tips[1])) < 0.005
+
+        async with Puppeteer(client, session, "Aiko") as puppeteer:
+            with pytest.raises(ControlRefused, match="owner"):
+                await puppeteer.bond("left_hand", "right_hand")
+            await puppeteer.claim("left_hand")
+            with pytest.raises(ControlRefused, match="leg"):
+                await puppeteer.bond("left_hand", "left_leg")
+            await puppeteer.bond("right_hand", "left_hand")
+            assert puppeteer.bonds == ((0, 1),)
+            await puppeteer.target("left_hand", -0.2, 0.0, 0.5)
+            await watch_until(viewer, do_hands_touch, lambda _, pose: shown.append(pose))
+            await puppeteer.unbond("left_hand", "right_hand")
+            await puppeteer.unbond("left_hand", "right_hand")
+            presence, end = puppeteer.presence, puppeteer.bond_end
+            assert presence is not None
+            assert presence.bonds is None
+            assert presence.limbs[0] == puppeteer.id
+            assert end is not None
+            assert end.reason == "released"
+            await puppeteer.bond("left_hand", "right_hand")

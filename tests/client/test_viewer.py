@@ -17,7 +17,8 @@ from websockets.typing import Subprotocol
 from bunraku.client import Client, StreamEnded, Viewer
 from bunraku.codec.container import add_audio_track, pack_motion
 from bunraku.codec.container import unpack_motion as unpack_motion
-from bunraku.codec.extension_encoder import encode_extension
+from bunraku.codec.extension.contact import encode_contacts
+from bunraku.codec.extension.encoder import encode_extension
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene_encoder import encode_scene
@@ -25,7 +26,9 @@ from bunraku.delivery.resume import ResumeState
 from bunraku.ingest.jobs.opus import encode_audio
 from bunraku.motion.analysis import analyse
 from bunraku.motion.extension import ExtendedPose, extend_pose
+from bunraku.motion.face import EXPRESSION_INDEX, face_expressions
 from bunraku.motion.skeleton import joint_and_tip_positions, world_transforms
+from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.storage.motion_store import MotionStore
 from bunraku.wire.messages import SUBPROTOCOL, Data, Description, Problem, TimelineState
@@ -35,6 +38,7 @@ from tests.patient_viewer import PatientViewer, watch_until
 from tests.servers import run_server
 from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
+from tests.vectors.hands_face import make_face, make_hands
 from tests.vectors.scene import sample_camera, sample_light
 
 PROTOCOL = Subprotocol(SUBPROTOCOL)
@@ -161,6 +165,66 @@ async def test_it_shows_the_joints_of_an_extension(tmp_path: Path) -> None:
         frame = round(((reference - state.clock) % 3_000_000) * 30 / 1e6) % 90
         np.testing.assert_allclose(pose.extra_positions[0], truth.extra_positions[frame], atol=0.08)
     assert viewer.extended_pose_at(max(seen), 1) is None
+
+
+async def test_it_has_the_fingers_and_the_face_of_a_performer(tmp_path: Path) -> None:
+    encoded = encode_motion(random_motion(1.5, 30.0, 5), error_bounds_mm=(5.0,), grade="live")
+    hands, turns = make_hands(1, (3,) * 10)
+    face, weights = make_face(2, ["jawOpen", "eyeBlinkLeft", "gazeYaw"])
+    extensions = [
+        encode_extension(each, values, encoded.track, [1.0]) for each, values in ((hands, turns), (face, weights))
+    ]
+    await MotionStore.open(f"file://{tmp_path}/library").put(
+        "acted", pack_motion("acted", encoded, extensions=extensions)
+    )
+    truth = face_expressions(face, weights)
+    with run_server(tmp_path) as url:
+        viewer = Viewer(Client(url).socket_url("/v1/motions/acted/stream"))
+        seen: dict[int, tuple[np.ndarray, dict[str, float]]] = {}
+
+        def note(reference: int, _pose: Pose) -> None:
+            fingers, expressions = viewer.fingers_at(reference), viewer.expressions_at(reference)
+            if fingers is not None and expressions:
+                assert fingers[0].counts == (3,) * 10
+                seen[reference] = fingers[1], expressions
+
+        await watch_until(viewer, lambda: len(seen) >= 5, note)
+    state = viewer.timeline_history.newest
+    assert state is not None
+    for reference, (values, expressions) in seen.items():
+        at = ((reference - state.clock) % 1_500_000) * 30 / 1e6
+        frame = min(int(at), 43)
+        wanted = turns[frame] + (at - frame) * (turns[frame + 1] - turns[frame])
+        np.testing.assert_allclose(values, wanted, atol=0.5)
+        assert set(expressions) == {"jawOpen", "eyeBlinkLeft", "eyeBlinkRight", "gazeYaw"}
+        mouth = truth[frame : frame + 2, EXPRESSION_INDEX["jawOpen"]]
+        assert mouth.min() - 0.1 <= expressions["jawOpen"] <= mouth.max() + 0.1
+    assert viewer.fingers_at(max(seen), 1) is None
+    assert viewer.expressions_at(max(seen), 1) == {}
+
+
+async def test_it_knows_which_feet_are_planted(tmp_path: Path) -> None:
+    encoded = encode_motion(random_motion(1.5, 30.0, 5), error_bounds_mm=(5.0,), grade="live")
+    planted = np.stack([np.arange(45) % 30 < 15, np.arange(45) % 20 >= 10], axis=1)
+    contacts = encode_contacts(planted, encoded.track)
+    await MotionStore.open(f"file://{tmp_path}/library").put(
+        "walked", pack_motion("walked", encoded, extensions=[contacts])
+    )
+    with run_server(tmp_path) as url:
+        viewer = Viewer(Client(url).socket_url("/v1/motions/walked/stream"))
+        seen: dict[int, tuple[bool, bool]] = {}
+
+        def note(reference: int, _pose: Pose) -> None:
+            if (found := viewer.contacts_at(reference)) is not None:
+                seen[reference] = found
+
+        await watch_until(viewer, lambda: len(seen) >= 10, note)
+    state = viewer.timeline_history.newest
+    assert state is not None
+    for reference, found in seen.items():
+        frame = int((timeline.position_at(state, reference) + 1) * 30 / 1e6)
+        assert found == tuple(planted[min(frame, 44)])
+    assert viewer.contacts_at(max(seen), 1) is None
 
 
 async def test_it_holds_the_sound_beside_the_dance(tmp_path: Path) -> None:

@@ -10,9 +10,8 @@ from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.motion_track import MotionTrack
-from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
-from bunraku.playout.block_store import MotionBlockStore
+from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.playout.timeline import TimelineHistory
 from bunraku.session import pose_cache
 from bunraku.session.pose_cache import BATCH_FRAMES, PoseCache, shared_block_store
@@ -49,7 +48,8 @@ async def test_poses_are_exact_across_block_boundaries_and_the_loop() -> None:
         found = poses.poses_at(due, STEP_US)
         assert expected is not None
         assert found is not None
-        np.testing.assert_allclose(found[0], expected[1], atol=1e-12)
+        for values, expected_values in zip(found[0], expected, strict=True):
+            np.testing.assert_allclose(values, expected_values, atol=1e-12)
 
 
 async def test_edit_applies_at_once_and_other_motion_has_no_poses() -> None:
@@ -67,10 +67,10 @@ async def test_edit_applies_at_once_and_other_motion_has_no_poses() -> None:
     still_poses = poses.poses_at(500_000, STEP_US)
     assert moving_poses is not None
     assert still_poses is not None
-    assert np.abs(moving_poses[0] - still_poses[0]).max() > 1e-3
+    assert np.abs(moving_poses[0][1] - still_poses[0][1]).max() > 1e-3
     later_poses = poses.poses_at(500_000 + 40 * STEP_US, STEP_US)
     assert later_poses is not None
-    np.testing.assert_array_equal(later_poses, still_poses)
+    np.testing.assert_array_equal(later_poses[0][1], still_poses[0][1])
     timelines.put(timeline.change_motion(paused, 600_000, "two", 5_000_000))
     await poses.decode_blocks(700_000)
     assert poses.poses_at(700_000, STEP_US) is None
@@ -85,13 +85,13 @@ async def test_stages_compute_batches_of_poses_at_different_frames(monkeypatch: 
         for due in (0, 1_000_000):
             await poses.decode_blocks(due)
     computed_at: list[int] = []
-    rotations_at = MotionBlockStore.rotations_at
+    computed_poses_at = MotionBlockStore.poses_at
 
-    def counting(store: MotionBlockStore, positions: list[int], loop: bool, duration: int) -> list[Array | None]:
+    def counting(store: MotionBlockStore, positions: list[int], loop: bool, duration: int) -> list[Pose | None]:
         computed_at.append(frame)
-        return rotations_at(store, positions, loop, duration)
+        return computed_poses_at(store, positions, loop, duration)
 
-    monkeypatch.setattr(MotionBlockStore, "rotations_at", counting)
+    monkeypatch.setattr(MotionBlockStore, "poses_at", counting)
     for frame in range(2 * BATCH_FRAMES):
         for poses in stages:
             assert poses.poses_at(frame * STEP_US, STEP_US) is not None
@@ -145,13 +145,14 @@ async def test_tracks_longer_or_shorter_than_the_motion_have_poses() -> None:
             found = poses.poses_at(frame * STEP_US, STEP_US)
             assert found is not None
             position = frame * STEP_US % motion.first_track.duration_us
-            for rotations, block_store in zip(found, blocks, strict=True):
+            for pose, block_store, performer in zip(found, blocks, motion.performers, strict=True):
                 expected = block_store.pose_at(position, True, motion.first_track.duration_us)
                 assert expected is not None
-                np.testing.assert_allclose(rotations, expected[1], atol=1e-12)
+                for values, placed in zip(pose, performer.placement.apply(*expected), strict=True):
+                    np.testing.assert_allclose(values, placed, atol=1e-12)
             # after the end of its track a performer keeps the last pose
             if name == "both" and position > MOTIONS[other].first_track.duration_us:
                 last = blocks[1].pose_at(MOTIONS[other].first_track.duration_us, False)
                 assert last is not None
-                np.testing.assert_allclose(found[1], last[1], atol=1e-12)
+                np.testing.assert_allclose(found[1][1][1:], last[1][1:], atol=1e-12)
     assert track.duration_us == MOTIONS["one"].first_track.duration_us

@@ -31,6 +31,8 @@ from bunraku.session.stage import (
 from bunraku.wire.messages import (
     Alive,
     Ask,
+    Bond,
+    BondEnd,
     Claim,
     Input,
     Notice,
@@ -316,6 +318,49 @@ async def test_log_holds_the_published_overlays_and_timelines(stage: Stage, bus:
     assert list(log.messages()) == published
     assert any(overlay.limbs for overlay in published)
     assert list(log.timelines) == [stage.timeline]
+
+
+def bonds_of(stage: Stage) -> list[list[int]] | None:
+    return stage.presence.bonds
+
+
+async def test_bonded_hands_are_published_logged_and_handed_back(stage: Stage, bus: MemoryBus) -> None:
+    audience = StageMessages(bus)
+    aiko = join_stage(stage, "Aiko")
+    stage.receive(aiko.puppeteer, Bond([0, 1], True))
+    assert unpack(aiko.received[-1]) == BondEnd([0, 1], "owner")
+    assert bonds_of(stage) is None
+    stage.receive(aiko.puppeteer, Claim(0))
+    stage.receive(aiko.puppeteer, Bond([1, 0], True))
+    assert bonds_of(stage) == [[0, 1]]
+    assert stage.presence.limbs == [aiko.id, None, None, None]
+    epoch = last_grant(aiko).epoch
+    for number in range(12):
+        stage.receive(aiko.puppeteer, Input(0, Input.TARGET, epoch, number, 16_000 * number, (-0.1, 0.0, 0.5)))
+        await audience.wait_for(len([m for m in audience.messages if isinstance(m, Overlay)]) + 1, Overlay)
+    stage.receive(aiko.puppeteer, Release(0, epoch))
+    assert BondEnd([0, 1], "released") in map(unpack, aiko.received)
+    assert bonds_of(stage) is None
+    await audience.wait_until_at_rest()
+    published = [message for message in audience.messages if isinstance(message, Overlay)]
+    assert {0, 1} in [set(overlay.limbs) for overlay in published]
+    assert list(SessionLog.unpack(stage.log.pack()).messages()) == published
+
+
+async def test_bond_of_dancers_far_apart_ends_with_the_reason(bus: MemoryBus) -> None:
+    motion, audience = MOTIONS["both"], StageMessages(bus)
+    state = timeline.start("both", motion.first_track.duration_us, clock())
+    stage = Stage(SessionStart("s", motion, state, state.clock), bus, clock)
+    aiko = join_stage(stage, "Aiko")
+    stage.receive(aiko.puppeteer, Claim(0))
+    stage.receive(aiko.puppeteer, Bond([0, 5], True))
+    assert bonds_of(stage) == [[0, 5]]
+    async with keep_holding(stage, aiko, 0):
+        await audience.wait_for(4, Overlay)
+    assert BondEnd([0, 5], "apart") in map(unpack, aiko.received)
+    assert bonds_of(stage) is None
+    assert stage.presence.limbs[0] == aiko.id
+    await stage.close()
 
 
 async def test_limb_stays_held_during_a_server_stall(stage: Stage, bus: MemoryBus) -> None:

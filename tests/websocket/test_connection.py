@@ -89,7 +89,8 @@ async def test_received_data_updates_the_time_of_the_clock() -> None:
 
 async def test_connection_that_is_closing_writes_and_delivers_nothing() -> None:
     transport, listener, connections = FakeTransport(), RecordingListener(), set[object]()
-    connection = WebSocketConnection(transport, listener, connections)
+    # a clock that stands still: all input has its turn at once, however long the machine takes
+    connection = WebSocketConnection(transport, listener, connections, lambda: 0)
     assert connections == {connection}
     connection.close_with_problem(CloseConnection(TRY_AGAIN_LATER, "Too slow", "try again later"))
     assert connection.is_closing

@@ -15,6 +15,8 @@ from bunraku.wire.live import Sample
 from bunraku.wire.messages import (
     Alive,
     Ask,
+    Bond,
+    BondEnd,
     ChannelHeader,
     Choice,
     Claim,
@@ -89,6 +91,8 @@ MESSAGES: st.SearchStrategy[Any] = st.one_of(
     st.builds(Choice, rate=TIME, reason=TEXT, line=st.none() | TIME),
     st.builds(Notice, limb=LIMB, reason=TEXT, detail=TEXT),
     st.builds(Ask, limb=LIMB, wanted=st.booleans()),
+    st.builds(Bond, limbs=st.lists(LIMB, min_size=2, max_size=2), wanted=st.booleans()),
+    st.builds(BondEnd, limbs=st.lists(LIMB, min_size=2, max_size=2), reason=st.text(max_size=8)),
     st.builds(
         Input,
         limb=LIMB,
@@ -199,6 +203,6 @@ def test_lowest_overlay_number_is_accepted() -> None:
 def test_types_are_unique_and_client_types_start_at_64() -> None:
     types = [kind.TYPE for kind in messages.Message.__args__]
     assert len(set(types)) == len(types)
-    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Input, Sample}
+    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Bond, Input, Sample}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client
     assert {*messages.FIXED_MESSAGES, *messages.MAP_MESSAGES} == set(messages.Message.__args__)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
+from collections.abc import Callable
 from typing import Self
 from urllib.parse import quote
 
@@ -20,6 +21,8 @@ from bunraku.wire.messages import (
     SUBPROTOCOL,
     Alive,
     Ask,
+    Bond,
+    BondEnd,
     Claim,
     Grant,
     Input,
@@ -59,6 +62,8 @@ class Puppeteer:
         self.presence: Presence | None = None
         self.notice: Notice | None = None
         """Last notice about an input that was changed or refused."""
+        self.bond_end: BondEnd | None = None
+        """Last refusal or end of a bond, with the reason."""
         self._epochs: dict[int, int] = {}
         self._last_inputs: dict[int, tuple[int, tuple[float, float, float]]] = {}
         """Last input of each held limb: kind and values."""
@@ -66,6 +71,7 @@ class Puppeteer:
         """Lost limbs with a pending claim."""
         self._sequence = 0
         self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
+        self._presence_changed = asyncio.Condition()
         self._welcome = asyncio.Event()
         self._connection: ClientConnection | None = None
         self._tasks: list[asyncio.Task[None]] = []
@@ -142,6 +148,44 @@ class Puppeteer:
         if number in self._epochs:
             await self._send(Release(number, self._epochs.pop(number)).pack())
 
+    @property
+    def bonds(self) -> tuple[tuple[int, int], ...]:
+        """Bonded hands by their limb numbers, the lower one first."""
+        pairs = self.presence.bonds if self.presence is not None else None
+        return tuple(_ordered(*pair) for pair in pairs or ())
+
+    async def bond(self, limb: str | int, other: str | int) -> None:
+        """Bond two hands, so that their tips stay together; raise `ControlRefused` if the session refuses.
+
+        One must be held; the other is held as well, or free: then it is led. Both return from the bond by `unbond`, by
+        a release, or when the performers move too far apart: `bond_end` has the reason.
+        """
+        first, second = pair = _ordered(limb, other)
+        self.bond_end = None
+        await self._send(Bond([first, second], True).pack())
+        await self._wait_until(lambda: pair in self.bonds or self._bond_end_reason(pair) is not None)
+        if (reason := self._bond_end_reason(pair)) is not None:
+            raise ControlRefused(f"{limb} and {other} are not bonded: {reason}")
+
+    async def unbond(self, limb: str | int, other: str | int) -> None:
+        """End the bond of two hands; those that are held stay so."""
+        pair = _ordered(limb, other)
+        if pair in self.bonds:
+            await self._send(Bond(list(pair), False).pack())
+            await self._wait_until(lambda: pair not in self.bonds)
+
+    async def _wait_until(self, is_settled: Callable[[], bool]) -> None:
+        """Wait for a message after which a request for a bond is settled; raise `ControlRefused` if none comes."""
+        try:
+            async with asyncio.timeout(ANSWER_TIMEOUT_S), self._presence_changed:
+                await self._presence_changed.wait_for(is_settled)
+        except TimeoutError:
+            raise ControlRefused(f"no answer for a bond: {self._close_reason}") from None
+
+    def _bond_end_reason(self, pair: tuple[int, int]) -> str | None:
+        end = self.bond_end
+        return end.reason if end is not None and _ordered(*end.limbs) == pair else None
+
     async def target(
         self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0, *, smooth: OneEuro | None = None
     ) -> None:
@@ -193,11 +237,19 @@ class Puppeteer:
                     await self._on_refusal(message)
                 elif isinstance(message, Notice):
                     self.notice = message
-                elif isinstance(message, Presence):
-                    self.presence = message
+                elif isinstance(message, Presence | BondEnd):
+                    await self._on_change(message)
                 elif isinstance(message, Problem):
                     self._close_reason = f"{message.title}: {message.detail}"
         self._welcome.set()
+
+    async def _on_change(self, message: Presence | BondEnd) -> None:
+        async with self._presence_changed:
+            if isinstance(message, Presence):
+                self.presence = message
+            else:
+                self.bond_end = message
+            self._presence_changed.notify_all()
 
     async def _on_grant(self, grant: Grant) -> None:
         limb, reclaimed = grant.limb, grant.limb in self._lost_limbs
@@ -231,3 +283,8 @@ class Puppeteer:
             if self._epochs:
                 with contextlib.suppress(ControlRefused):
                     await self._send(Alive(list(self._epochs)).pack())
+
+
+def _ordered(limb: str | int, other: str | int) -> tuple[int, int]:
+    first, second = limb_number(limb), limb_number(other)
+    return (first, second) if first < second else (second, first)

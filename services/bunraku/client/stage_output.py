@@ -81,6 +81,8 @@ class VmcOutput:
             *found,
             seconds,
             extended=(extension, extended) if extension is not None and extended is not None else None,
+            fingers=self._viewer.fingers_at(reference, self._performer),
+            expressions=self._viewer.expressions_at(reference, self._performer),
             scale=self._scale,
             root_motion=self._root_motion,
         )

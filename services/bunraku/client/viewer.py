@@ -17,7 +17,7 @@ from bunraku.client.viewer_statistics import ViewerStatistics
 from bunraku.codec import motion_decoder
 from bunraku.codec.audio import AudioPacket, AudioTrack
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension_track import decode_extension_block
+from bunraku.codec.extension.track import Extension, ExtensionPart, decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_track import MotionTrack
@@ -25,11 +25,13 @@ from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.delivery.resume import MAX_BLOCKS, HeldBlocks, ResumeState
 from bunraku.motion.extension import BodyExtension, ExtendedPose, extend_pose
+from bunraku.motion.face import EXPRESSION_INDEX, Face, face_expressions
+from bunraku.motion.hands import Hands
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import world_transforms
 from bunraku.playout import timeline
 from bunraku.playout.audio_store import AudioBlockStore
-from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, Pose, SceneBlockStore
+from bunraku.playout.block_store import ContactBlockStore, ExtensionBlockStore, MotionBlockStore, Pose, SceneBlockStore
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.live_buffer import LiveBuffer
@@ -133,7 +135,7 @@ class Viewer:
     def _make_url(self) -> str:
         """Return the URL to connect to: after the first connection with the blocks already received and the
         position."""
-        query = {"extensions": "true"}
+        query = {"extensions": "true", "parts": ",".join(ExtensionPart)}
         state = self.timeline_history.newest
         if state is not None and self._tracks is not None and self.motion is not None:
             now = self.clock.at(self._local_clock())
@@ -195,22 +197,72 @@ class Viewer:
 
         None if the motion has no extension of the performer, or a block is missing. The arrays have one instant.
         """
-        state, tracks = self.timeline_history.at(reference), self._tracks
-        pose = self.pose_at(reference, performer)
-        if pose is None or state is None or tracks is None or performer not in tracks.extensions:
+        tracks, pose = self._tracks, self.pose_at(reference, performer)
+        motion = tracks.performers[performer] if pose is not None and tracks is not None else None
+        found = self._extension_values(reference, performer, ExtensionPart.BODY)
+        if pose is None or motion is None or found is None:
             return None
-        store, motion = tracks.extensions[performer], tracks.performers[performer]
-        values = store.values_at(timeline.position_at(state, reference), state.loop, state.duration)
-        if values is None or motion is None:
-            return None
+        extension, values = found
+        assert isinstance(extension, BodyExtension)
         figure = motion.track.figure
         placed = world_transforms(figure, pose[0][None], pose[1][None])
-        return extend_pose(figure, store.track.extension, *placed, values[None])
+        return extend_pose(figure, extension, *placed, values[None])
+
+    def fingers_at(self, reference: int, performer: int = 0) -> tuple[Hands, Array] | None:
+        """Return the fingers of a performer, and the rotation vectors (E, 3) of their joints, in radians.
+
+        Each is in the frame of the joint before, at first of the wrist; `motion.hands.pose_hands` places the joints.
+        None if the motion has no fingers of the performer, or a block is missing.
+        """
+        found = self._extension_values(reference, performer, ExtensionPart.FINGERS)
+        if found is None:
+            return None
+        hands, values = found
+        assert isinstance(hands, Hands)
+        return hands, values
+
+    def expressions_at(self, reference: int, performer: int = 0) -> dict[str, float]:
+        """Return the weights of a performer's expressions: those of ARKit, the presets of VRM, and gaze in radians.
+
+        Empty if the motion has no face of the performer, or a block is missing.
+        """
+        found = self._extension_values(reference, performer, ExtensionPart.FACE)
+        if found is None:
+            return {}
+        face, values = found
+        assert isinstance(face, Face)
+        weights = face_expressions(face, values[None])[0]
+        return {name: float(weights[EXPRESSION_INDEX[name]]) for name in face.names}
+
+    def contacts_at(self, reference: int, performer: int = 0) -> tuple[bool, bool] | None:
+        """Return whether a performer's left and right foot are planted in the motion at clock time `reference`.
+
+        None if it is not known: the performer is live, the motion has no contacts of it, or a block is missing.
+        """
+        state, tracks = self.timeline_history.at(reference), self._tracks
+        if state is None or tracks is None or state.motion != self.motion:
+            return None
+        live, store = self._live.get(performer), tracks.contacts.get(performer)
+        if store is None or (live is not None and live.pose_at(reference) is not None):
+            return None
+        contacts = store.contacts_at(timeline.position_at(state, reference))
+        return None if contacts is None else (bool(contacts[0]), bool(contacts[1]))
+
+    def _extension_values(self, reference: int, performer: int, part: ExtensionPart) -> tuple[Extension, Array] | None:
+        """Return an extension and its values at `reference`; None if there is none, or a block is missing."""
+        state, tracks = self.timeline_history.at(reference), self._tracks
+        if state is None or tracks is None or state.motion != self.motion:
+            return None
+        live, store = self._live.get(performer), tracks.extensions.get((performer, part))
+        if store is None or (live is not None and live.pose_at(reference) is not None):
+            return None
+        values = store.values_at(timeline.position_at(state, reference), state.loop, state.duration)
+        return None if values is None else (store.track.extension, values)
 
     def extension_of(self, performer: int = 0) -> BodyExtension | None:
         """Return the extension of a performer, None if there is none."""
-        store = self._tracks.extensions.get(performer) if self._tracks is not None else None
-        return store.track.extension if store is not None else None
+        store = self._tracks.extensions.get((performer, ExtensionPart.BODY)) if self._tracks is not None else None
+        return store.track.extension if store is not None else None  # type: ignore[return-value]
 
     def scene_at(self, reference: int, scene: int = 0) -> Array | None:
         """Return the seven values (7,) of the camera or light `scenes[scene]` at `reference`, or None
@@ -326,6 +378,8 @@ class Viewer:
                 self.statistics.light_blocks += 1
         elif isinstance(store, ExtensionBlockStore):
             store.put(data.index, data.rate, decode_extension_block(store.track, data.block))
+        elif isinstance(store, ContactBlockStore):
+            store.put_encoded(data.index, data.rate, data.block)
         elif isinstance(store, AudioBlockStore):
             store.put_encoded(data.index, data.rate, data.block)
             self.statistics.audio_blocks += 1

@@ -9,9 +9,8 @@ from weakref import WeakValueDictionary
 from bunraku.codec.container import StoredMotion
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_track import MotionTrack
-from bunraku.motion.rotation import Array
 from bunraku.playout import timeline
-from bunraku.playout.block_store import MotionBlockStore
+from bunraku.playout.block_store import MotionBlockStore, Pose
 from bunraku.playout.timeline import TimelineHistory
 from bunraku.wire.messages import Data
 
@@ -37,7 +36,7 @@ class PoseCache:
         self._motion = motion
         self._timelines = timelines
         self._blocks = [shared_block_store(performer.track) for performer in motion.performers]
-        self._poses_by_time: dict[int, tuple[Array, ...]] = {}
+        self._poses_by_time: dict[int, tuple[Pose, ...]] = {}
         self._epoch = -1
         self._batch_phase = secrets.randbelow(BATCH_FRAMES)
 
@@ -56,8 +55,8 @@ class PoseCache:
                     packet = Data.unpack(performer.packets[-1][index])
                     blocks.put(index, packet.rate, await asyncio.to_thread(decode_motion_block, track, packet.block))
 
-    def poses_at(self, due: int, step_us: int) -> tuple[Array, ...] | None:
-        """Return the rotations (18, 4) of each performer at clock time `due`.
+    def poses_at(self, due: int, step_us: int) -> tuple[Pose, ...] | None:
+        """Return the pose of each performer, placed on the stage, at clock time `due`.
 
         None if a block is missing or another motion plays. Poses of up to `BATCH_FRAMES` next frames, `step_us` apart,
         are computed at the same time; they are valid until the timeline is edited. Each stage has its own phase of
@@ -72,7 +71,7 @@ class PoseCache:
             self._poses_by_time = self._compute_poses([due + step_us * k for k in range(frames)])
         return self._poses_by_time.get(due)
 
-    def _compute_poses(self, due_times: list[int]) -> dict[int, tuple[Array, ...]]:
+    def _compute_poses(self, due_times: list[int]) -> dict[int, tuple[Pose, ...]]:
         states = [self._timelines.at(due) for due in due_times]
         playing = [
             (due, timeline.position_at(state, due), state.loop)
@@ -83,10 +82,13 @@ class PoseCache:
             return {}
         positions, loop = [position for _, position, _ in playing], playing[0][2]
         duration = self._motion.first_track.duration_us
-        each = (blocks.rotations_at(positions, loop, duration) for blocks in self._blocks)
-        computed: dict[int, tuple[Array, ...]] = {}
+        each = (blocks.poses_at(positions, loop, duration) for blocks in self._blocks)
+        placements = [performer.placement for performer in self._motion.performers]
+        computed: dict[int, tuple[Pose, ...]] = {}
         for (due, _, _), poses in zip(playing, zip(*each, strict=True), strict=True):
-            decoded = tuple(pose for pose in poses if pose is not None)
-            if len(decoded) == len(poses):
-                computed[due] = decoded
+            placed = tuple(
+                placement.apply(*pose) for placement, pose in zip(placements, poses, strict=True) if pose is not None
+            )
+            if len(placed) == len(poses):
+                computed[due] = placed
         return computed

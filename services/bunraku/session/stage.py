@@ -22,13 +22,13 @@ from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.bus import Bus, Subscription
-from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.block_store import Pose
 from bunraku.playout.overlay_buffer import pack_overlay
 from bunraku.playout.performance import SampleOutcome
 from bunraku.playout.session_log import SessionLog
+from bunraku.session.bond_control import BondControl
 from bunraku.session.counters import SessionCounters
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.live.cast import EMPTY_CAST, Cast
@@ -40,7 +40,19 @@ from bunraku.session.schema import SessionEdit
 from bunraku.session.stall import EventLoopStallCompensation
 from bunraku.wire import messages
 from bunraku.wire.live import Sample
-from bunraku.wire.messages import Alive, Ask, Claim, Grant, Input, Presence, Refusal, Release, TimelineState, Welcome
+from bunraku.wire.messages import (
+    Alive,
+    Ask,
+    Bond,
+    Claim,
+    Grant,
+    Input,
+    Presence,
+    Refusal,
+    Release,
+    TimelineState,
+    Welcome,
+)
 from bunraku.wire.overlay import Overlay
 
 OVERLAY_LEAD_US = 60_000
@@ -107,6 +119,7 @@ class Stage:
         self.log.add_timeline(self.timeline)
         self._marionettes = Marionettes(_performer_figures(start.motion), solver=solver)
         self._ownership = self._marionettes.ownership
+        self._bonds = BondControl(self._ownership, self.puppeteers)
         self._set_motion(start.motion)
         subject = f"session.{start.id}"
         self._subscriptions: list[Subscription] = [
@@ -169,11 +182,12 @@ class Stage:
 
     @property
     def presence(self) -> Presence:
-        """Viewer count, puppeteers, limb holders and requests for limbs."""
+        """Viewer count, puppeteers, limb holders, requests for limbs and bonds."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         asks = [list(limb) for limb in self._ownership.asks()]
         live = self.live.presence() or None
-        return Presence(self.presence_publisher.viewer_count, puppeteers, list(self.holders), asks, live)
+        bonds = [list(pair) for pair in self._ownership.bonds] or None
+        return Presence(self.presence_publisher.viewer_count, puppeteers, list(self.holders), asks, live, bonds)
 
     def plan_edit(self, edit: SessionEdit, motion: StoredMotion | None) -> TimelineState | None:
         """Return the timeline after an edit, due `EDIT_LEAD_US` from now; None if the edit changes nothing.
@@ -231,6 +245,7 @@ class Stage:
         self.puppeteers.leave(puppeteer)
         now = self._clock()
         self._ownership.leave(puppeteer.id, now)
+        self._bonds.report_ended()
         self._grant_free_limbs(now)
         self.presence_publisher.publish()
 
@@ -249,6 +264,7 @@ class Stage:
             if puppeteer.granted_epochs.get(message.limb) == message.epoch:
                 del puppeteer.granted_epochs[message.limb]
             if self._ownership.release(message.limb, puppeteer.id, message.epoch, now):
+                self._bonds.report_ended()
                 self._grant_free_limbs(now)
                 self.presence_publisher.publish()
         elif isinstance(message, Alive):
@@ -261,6 +277,9 @@ class Stage:
             if message.wanted and self._asks_under_another_name(puppeteer, message.limb):
                 return
             if self._ownership.ask(message.limb, puppeteer.id, message.wanted, now):
+                self.presence_publisher.publish()
+        elif isinstance(message, Bond):
+            if self._bonds.receive(puppeteer, message, now):
                 self.presence_publisher.publish()
         elif isinstance(message, Input):
             self._receive_input(puppeteer, message, now)
@@ -381,7 +400,8 @@ class Stage:
         for limb, holder in lost:
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
-        if self._grant_free_limbs(now) or lost:
+        has_changes = self._bonds.report_ended()
+        if self._grant_free_limbs(now) or lost or has_changes:
             self.presence_publisher.publish()
         frame_overlays: list[OverlayJoints] = []
         live_frames: list[dict[int, Pose]] = []
@@ -405,12 +425,16 @@ class Stage:
         # the first samples are shown only after their delay
         return not self._ownership.is_at_rest or self.live.is_shown or self.live.has_unshown_samples(now)
 
-    def _poses_at(self, due: int, live: Mapping[int, Pose]) -> tuple[Array, ...] | None:
-        """Return the rotations (18, 4) of each performer at clock time `due`, those of live ones as given."""
+    def _poses_at(self, due: int, live: Mapping[int, Pose]) -> tuple[Pose, ...] | None:
+        """Return the pose of each performer on the stage at clock time `due`, those of live ones as given."""
         poses = self._pose_cache.poses_at(due, FRAME_INTERVAL_US)
         if not live or poses is None:
             return poses
-        return tuple(live[number][1] if number in live else pose for number, pose in enumerate(poses))
+        performers = self._motion.performers
+        return tuple(
+            performers[number].placement.apply(*live[number]) if number in live else pose
+            for number, pose in enumerate(poses)
+        )
 
 
 def load_bend_tables(motion: StoredMotion) -> None:

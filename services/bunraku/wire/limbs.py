@@ -4,6 +4,8 @@ LIMBS: tuple[str, ...] = ("left_hand", "right_hand", "left_leg", "right_leg")
 """Limbs of one performer."""
 MAX_PERFORMERS = 4
 MAX_LIMBS = len(LIMBS) * MAX_PERFORMERS
+MAX_BONDS = MAX_LIMBS // 4
+"""Most bonds of a stage: half of a performer's limbs are hands, and each is in one bond."""
 
 
 def limb_number(limb: str | int) -> int:

@@ -17,7 +17,7 @@ import msgpack
 from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
 
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import MAX_LIMBS, MAX_PERFORMERS
+from bunraku.wire.limbs import MAX_BONDS, MAX_LIMBS, MAX_PERFORMERS
 from bunraku.wire.live import Live, Sample
 from bunraku.wire.overlay import Overlay
 
@@ -37,6 +37,9 @@ Duration = Annotated[SafeInteger, Field(description="Duration in microseconds.")
 MotionId = Annotated[Text, Field(description="Id of the motion.")]
 LimbNumber = Annotated[
     int, Field(strict=True, ge=0, lt=MAX_LIMBS, description="Limb l of performer k has number 4 k + l.")
+]
+HandPair = Annotated[
+    list[LimbNumber], Field(min_length=2, max_length=2, description="Numbers of two hands, in any order.")
 ]
 LimbEpoch = Annotated[SafeInteger, Field(description="Epoch of the grant.")]
 Tracks = Annotated[
@@ -149,7 +152,8 @@ class Presence(_MapMessage):
     """Viewers, puppeteers, holders of the limbs, pending requests for held limbs, and live performers.
 
     `limbs` has an id or None for each limb. `asks` has a list of ids for each limb, in the order of the requests; if it
-    is empty it is replaced by an empty list for each limb. `live` is None if no performer is live.
+    is empty it is replaced by an empty list for each limb. `live` is None if no performer is live, `bonds` if no hands
+    are bonded.
     """
 
     TYPE = 6
@@ -161,6 +165,10 @@ class Presence(_MapMessage):
     ] = field(default_factory=list)
     live: Annotated[
         LiveEntries | None, Field(description="Live performers of the motion, by number; absent: none.")
+    ] = None
+    bonds: Annotated[
+        list[HandPair] | None,
+        Field(min_length=1, max_length=MAX_BONDS, description="Bonded hands; absent: none."),
     ] = None
 
     def __post_init__(self) -> None:
@@ -216,6 +224,15 @@ class Notice(_MapMessage):
     limb: LimbNumber
     reason: Annotated[Text, Field(description="`reach`, `owner` or `rate`.")]
     detail: Annotated[Text, Field(description="The reason for a person.")]
+
+
+@dataclass(frozen=True, slots=True)
+class BondEnd(_MapMessage):
+    """Two hands are not, or no longer, bonded."""
+
+    TYPE = 16
+    limbs: HandPair
+    reason: Annotated[Text, Field(description="A reason of proto/messages.md, 3.7.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -282,6 +299,15 @@ class Ask(_MapMessage):
 
     TYPE = 71
     limb: LimbNumber
+    wanted: Flag
+
+
+@dataclass(frozen=True, slots=True)
+class Bond(_MapMessage):
+    """Request to bond two hands, or to end their bond."""
+
+    TYPE = 73
+    limbs: HandPair
     wanted: Flag
 
 
@@ -390,14 +416,14 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Notice | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Input | Sample
+    | Notice | BondEnd | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Bond | Input | Sample
 )  # fmt: skip
 
 FIXED_MESSAGES = (Data, Overlay, Live, Ping, Pong, Input, Sample)
 """Messages of fixed layout."""
 MAP_MESSAGES = (
-    ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, Choice, Edit, Report,
-    Claim, Release, Alive, Ask,
+    ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, BondEnd, Choice,
+    Edit, Report, Claim, Release, Alive, Ask, Bond,
 )  # fmt: skip
 """Messages that are a MessagePack map."""
 

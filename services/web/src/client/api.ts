@@ -227,8 +227,8 @@ export interface StoredTakes {
 export const PROGRESS_INTERVAL_MS = 400;
 
 /**
- * Upload a motion capture file, and store each of its takes. An XMLHttpRequest is used, since fetch does not report the progress of sending; the
- * progress on the server is polled.
+ * Upload a motion capture file, and store each of its takes. An XMLHttpRequest is used, since fetch does not report
+ * the progress of sending; the progress on the server is polled.
  *
  * @throws ProblemError if the upload fails, or the reason of `signal` if it is aborted
  */

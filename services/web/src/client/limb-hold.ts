@@ -144,6 +144,7 @@ export class LimbHold {
         values,
       });
     target.advance(nowMs);
+    if (target.hasFollowed) this.isTargetSent = target.hasFollowed = false;
     const sendsVelocity = this.unsent === "velocity" && isMoving(this.velocity);
     // sent once after the grant and at the end of each movement, so that both ends agree on the position
     if (target.isKnown && !(sendsVelocity && this.isTargetSent)) {

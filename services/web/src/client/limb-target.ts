@@ -24,6 +24,9 @@ export const THIGH_RANGE: readonly [number, number] = [MIN_THIGH_ANGLE_RAD, MAX_
 /** Maximum time to approach a target. */
 const MAX_TARGET_DURATION_MS = MAX_TARGET_DURATION_US / 1000;
 
+/** Time without an input after which the target of a bonded hand follows the pair. */
+const FOLLOW_DELAY_MS = 1_000;
+
 /** Target of one limb. */
 export class LimbTarget {
   /** True from the claim to the release. */
@@ -32,6 +35,8 @@ export class LimbTarget {
   readonly value = new Float64Array(3);
   /** True once there is a value: the position of the limb at its first frame, or the first target. */
   isKnown = false;
+  /** True if the value has followed the pair since the last input: the session may have another one. */
+  hasFollowed = false;
 
   private readonly velocity = new Float64Array(3);
   private movedAt = 0;
@@ -69,6 +74,18 @@ export class LimbTarget {
     this.set(position[0], position[1], position[2]);
     this.isKnown = true;
     this.movedAt = nowMs;
+  }
+
+  /**
+   * Set the value of a bonded hand to its shown place, where the next movement starts, unless there was an input just
+   * now. The session does the same with a puppeteer who does not move the pair.
+   */
+  follow(place: Float64Array, nowMs: number): void {
+    const isMoving = this.velocity.some((part) => part !== 0);
+    if (isMoving || nowMs - this.inputAt < FOLLOW_DELAY_MS) return;
+    this.set(place[0], place[1], place[2]);
+    this.durationMs = 0;
+    this.isKnown = this.hasFollowed = true;
   }
 
   /** Set the target; one out of reach is clamped. */

@@ -4,7 +4,7 @@
  */
 
 import { DamagedBlock } from "../codec/errors";
-import { ExtensionTrack } from "../codec/extension-track";
+import { type ExtensionPart, ExtensionTrack } from "../codec/extension/track";
 import { MotionTrack } from "../codec/motion-track";
 import { parseLadder, parseTiming, type Timing } from "../codec/timing";
 import { MotionBlockStore, type TrackBlockStore } from "../playout/block-store";
@@ -27,11 +27,11 @@ export interface MotionDownloadOptions {
   signal?: AbortSignal;
 }
 
-/** A downloaded motion, the number of frames to use, and the extension, null if there is none that can be read. */
+/** A downloaded motion, the number of frames to use, and the extensions that there are and that can be read. */
 export interface DownloadedMotion {
   store: MotionBlockStore;
   frames: number;
-  extension: ExtensionBlockStore | null;
+  extensions: Partial<Record<ExtensionPart, ExtensionBlockStore>>;
 }
 
 /** Blocks of a track that are to be fetched. */
@@ -66,8 +66,11 @@ export async function downloadMotion(
     const frames = Math.min(track.frames, Math.max(1, Math.round((durationUs * track.fps) / 1e6)));
     const isUsed = (index: number) => track.firstFrame(index) < frames;
     const missing = [missingBlocks(trackIndex, store, track.ladder.length - 1, isUsed)];
-    const found = findExtension(tracks, performer);
-    if (found) missing.push(missingBlocks(found.index, found.store, found.highest, isUsed));
+    const extensions: DownloadedMotion["extensions"] = {};
+    for (const { index, store: extension, highest } of findExtensions(tracks, performer)) {
+      extensions[extension.track.content.part] ??= extension;
+      missing.push(missingBlocks(index, extension, highest, isUsed));
+    }
     const requests = missing.flatMap((each) => each.indices.map((index) => ({ ...each, index })));
     const total = Math.max(requests.length, 1);
     let doneCount = 0;
@@ -81,7 +84,7 @@ export async function downloadMotion(
       }
     };
     await Promise.all(Array.from({ length: MAX_CONCURRENT_REQUESTS }, fetchMissing));
-    return { store, frames, extension: found?.store ?? null };
+    return { store, frames, extensions };
   } catch (error) {
     signal?.throwIfAborted();
     if (error instanceof DamagedBlock || error instanceof MalformedMessage)
@@ -101,20 +104,21 @@ function missingBlocks(
   return { track, store, level, indices };
 }
 
-/** Return the extension of a performer with the index of its track and its highest level; null if there is none. */
-function findExtension(
+/** Return the extensions of a performer that can be read, with the index of their tracks and their highest levels. */
+function findExtensions(
   tracks: readonly Track[],
   performer: number,
-): { index: number; store: ExtensionBlockStore; highest: number } | null {
-  const index = tracks.findIndex((track) => track.type === "extension" && track.performer === performer);
-  if (index < 0) return null;
-  try {
-    const store = new ExtensionBlockStore(ExtensionTrack.fromDescription(tracks[index]));
-    return { index, store, highest: parseLadder(tracks[index], "extension").length - 1 };
-  } catch (error) {
-    if (!(error instanceof DamagedBlock)) throw error;
-    return null;
-  }
+): { index: number; store: ExtensionBlockStore; highest: number }[] {
+  return tracks.flatMap((track, index) => {
+    if (track.type !== "extension" || track.performer !== performer) return [];
+    try {
+      const store = new ExtensionBlockStore(ExtensionTrack.fromDescription(track));
+      return [{ index, store, highest: parseLadder(track, "extension").length - 1 }];
+    } catch (error) {
+      if (!(error instanceof DamagedBlock)) throw error;
+      return [];
+    }
+  });
 }
 
 /** Fetch the message at `url`; raise `MalformedMessage` if it has another name. */

@@ -1,6 +1,7 @@
 /** Performers of the current motion, and the playback statistics of the first one. */
 
 import type { StagedPose } from "../motion/extension";
+import { CONTACT_PART, markControlledLegs } from "../motion/foot-contact";
 import type { Figure } from "../motion/skeleton";
 import type { ExtensionPoses } from "../playout/extension-poses";
 import type { LivePoses } from "../playout/live-poses";
@@ -74,7 +75,7 @@ export class PerformerViewSet {
       this.all.push(store && new PerformerView(number, store, this.createLoader(store.track.figure)));
     }
     if (this.extensions) this.extensions.add(extensions);
-    else if (extensions.size > 0) void this.loadExtensions();
+    else this.requestExtensions(extensions);
   }
 
   /** Store a block of an extension; return false if it is damaged. */
@@ -116,9 +117,21 @@ export class PerformerViewSet {
       }
     }
     const pose: StagedPose | null = view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
-    const extension = isLive ? null : this.extensions?.performer(performer);
-    if (pose) pose.extended = extension?.extend(view.figure, pose, position, timeline.loop, timeline.duration) ?? null;
+    if (!pose) return null;
+    pose.extended = pose.hands = pose.face = pose.contacts = null;
+    if (!isLive)
+      this.extensions
+        ?.performer(performer)
+        ?.extend(view.figure, pose, { clock, position, loop: timeline.loop, duration: timeline.duration });
+    const { contacts } = pose as StagedPose;
+    if (contacts) markControlledLegs(contacts, view.controlledLimbs);
     return pose;
+  }
+
+  /** Load the code of extensions. That of contacts alone waits for the first pose, which they do not change. */
+  private requestExtensions(extensions: TrackSet["extensions"]): void {
+    const isStarted = this.firstPoseMs !== null;
+    if ([...extensions.values()].some(({ part }) => isStarted || part !== CONTACT_PART)) void this.loadExtensions();
   }
 
   private async loadExtensions(): Promise<void> {
@@ -149,8 +162,10 @@ export class PerformerViewSet {
   }
 
   private onPoseShown(nowMs: number): void {
-    this.firstPoseMs ??= nowMs;
     this.missingBlock = -1;
+    if (this.firstPoseMs !== null) return;
+    this.firstPoseMs = nowMs;
+    if (this.tracks && !this.extensions) this.requestExtensions(this.tracks.extensions);
   }
 
   private onBlockShown(level: number, nowMs: number): void {

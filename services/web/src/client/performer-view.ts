@@ -10,8 +10,8 @@ import type { SolverLoader } from "./solver-loader";
 
 /** Source of predictions for the limbs that this page controls: a puppeteer. */
 export interface LimbPredictor {
-  /** Apply the predictions to the frame's pose. */
-  applyOwnLimbs(frame: PredictionFrame): void;
+  /** Apply the predictions to the frame's pose. Return the mask of the performer's limbs that are predicted. */
+  applyOwnLimbs(frame: PredictionFrame): number;
 }
 
 /** Instant and live inputs of a drawn frame. */
@@ -28,6 +28,8 @@ export interface FrameContext {
 export class PerformerView implements StagedPerformer {
   /** True once there was a pose to show. */
   hasPose = false;
+  /** Mask of the limbs that are controlled in the last pose, by overlays or predictions; bit 0 is the first limb. */
+  controlledLimbs = 0;
   private readonly motionPose = restPose();
   private readonly mergedPose = restPose();
 
@@ -86,7 +88,8 @@ export class PerformerView implements StagedPerformer {
     const { solver } = this.solverLoader;
     copyPose(motion, pose);
     const overlaidMask = overlays.apply(clock, pose, performer);
-    if (solver) predictor?.applyOwnLimbs({ performer, pose, motion, overlaidMask, nowMs, solver });
+    const frame = solver && { performer, pose, motion, overlaidMask, nowMs, solver };
+    this.controlledLimbs = overlaidMask | ((frame && predictor?.applyOwnLimbs(frame)) ?? 0);
     return applyPlacement(pose, this.placement);
   }
 }

@@ -1,8 +1,8 @@
 /**
  * Prediction of one limb that this page controls: it moves at once, as the session will move it for all viewers.
  *
- * After its return to the motion, and while another puppeteer holds it, the limb is shown as the session sends it.
- * Transitions between the two are smooth (`marionette/correction`). Times are local milliseconds.
+ * After its return to the motion, in a bond, and while another puppeteer holds it, the limb is shown as the session
+ * sends it. Transitions between the two are smooth (`marionette/correction`). Times are local milliseconds.
  */
 
 import type { ControlledLimb } from "../marionette/controlled-limb";
@@ -42,6 +42,7 @@ export class PredictedLimb {
   private readonly correction = new Correction();
   /** Predicted rotations of the limb's three joints. */
   private readonly joints = new Float64Array(12);
+  private readonly shownPlace = new Float64Array(3);
   /** Number of the limb within its performer, and index of its first number in a pose. */
   private readonly localNumber: number;
   private readonly offset: number;
@@ -61,8 +62,16 @@ export class PredictedLimb {
     this.offset = 4 * LIMB_FIRST_JOINTS[this.localNumber];
   }
 
-  /** Apply the prediction to the frame's pose, unless another puppeteer holds the limb (`isHeldByOther`). */
-  apply({ pose, motion, overlaidMask, nowMs, solver }: PredictionFrame, isHeldByOther: boolean): void {
+  /**
+   * Apply the prediction to the frame's pose, unless another puppeteer holds the limb (`isHeldByOther`), or it is a
+   * hand in a bond (`isBonded`): a bonded hand is shown as the session sends it, at the other hand of the pair. Return
+   * whether the limb is predicted.
+   */
+  apply(
+    { pose, motion, overlaidMask, nowMs, solver }: PredictionFrame,
+    isHeldByOther: boolean,
+    isBonded = false,
+  ): boolean {
     const { target, handover, correction, joints, offset } = this;
     const seconds = this.drawnAt === null ? 0 : Math.min(Math.max(nowMs - this.drawnAt, 0) / 1000, MAX_STEP_S);
     this.drawnAt = nowMs;
@@ -76,24 +85,30 @@ export class PredictedLimb {
     }
     handover.advance(isHeldHere, seconds);
     controlled.observePose(motion.rotations, seconds);
-    if (isHeldHere && !this.hasLeftMotion) {
+    if (isHeldHere && isBonded) {
+      controlled.placeInPose(this.shownPlace, pose.rotations);
+      target.follow(this.shownPlace, nowMs);
+    } else if (isHeldHere && !this.hasLeftMotion) {
       this.hasLeftMotion = true;
       // while an earlier control is still shown, start from the shown position
       if (isOverlaid && !this.isPredicted) controlled.startFrom(pose.rotations);
     }
     this.step(controlled, motion, nowMs, seconds);
     const isPredicted =
-      !isHeldByOther && (this.hasLeftMotion || (this.isPredicted && isOverlaid && this.sinceReturnS < MAX_RETURN_S));
+      !isHeldByOther &&
+      !isBonded &&
+      (this.hasLeftMotion || (this.isPredicted && isOverlaid && this.sinceReturnS < MAX_RETURN_S));
     correction.advance(seconds);
     if (isPredicted && !this.isPredicted) correction.begin(pose.rotations, offset, joints, 0);
     if (!isPredicted && this.isPredicted) correction.begin(joints, 0, pose.rotations, offset);
     this.isPredicted = isPredicted;
     if (isPredicted) pose.rotations.set(joints, offset);
     correction.apply(pose.rotations, offset);
-    if (isHeldByOther && this.hasLeftMotion) {
+    if ((isHeldByOther || isBonded) && this.hasLeftMotion) {
       this.hasLeftMotion = false;
       controlled.reset();
     }
+    return isPredicted;
   }
 
   /** Advance the prediction by `seconds` and write its `joints`. */

@@ -38,6 +38,7 @@ export interface PuppeteerOptions {
  * - "grant" (detail `{limb, asked}`): the limb is held; `asked` if another puppeteer handed it over.
  * - "refusal" (detail `{limb, reason, holder}`): a claim was refused, or a held limb was lost.
  * - "lapsed" (detail `{limb, free}`): a request for the limb ended without a grant; `free` if nobody holds it.
+ * - "bondend" (detail `{limbs, reason}`): two hands are not, or no longer, bonded (`proto/messages.md`, 3.7).
  * - "notice" (detail `{limb, reason, detail}`): an input was changed by the session.
  * - "presence": there is a new `presence`.
  * - "closed" (detail: the reason): the connection is lost, or closed for good if `isClosed`.
@@ -121,6 +122,29 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     return this.limbHolds[limb].askState !== "none";
   }
 
+  /** Bonded hands, as last sent by the session. */
+  get bonds(): readonly (readonly number[])[] {
+    return this.presence?.bonds ?? [];
+  }
+
+  /** Return true if the limb is a hand in a bond. */
+  isBonded(limb: number): boolean {
+    return this.bonds.some((pair) => pair.includes(limb));
+  }
+
+  /**
+   * Bond two hands, so that their tips stay together: one held here, the other as well, or free. The session answers
+   * with a new `presence`, or with "bondend".
+   */
+  bond(limb: number, other: number): void {
+    this.connection.send({ name: "Bond", limbs: [limb, other], wanted: true });
+  }
+
+  /** End the bond of two hands; those that are held stay so. */
+  unbond(limb: number, other: number): void {
+    this.connection.send({ name: "Bond", limbs: [limb, other], wanted: false });
+  }
+
   /** Return true if the session has granted the limb. */
   holds(limb: number): boolean {
     return this.limbHolds[limb].state === "granted";
@@ -145,11 +169,14 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     this.sendInput(hold, this.now());
   }
 
-  applyOwnLimbs(frame: PredictionFrame): void {
+  applyOwnLimbs(frame: PredictionFrame): number {
+    let predicted = 0;
     for (let nth = 0; nth < LIMBS.length; nth++) {
       const { prediction, holder } = this.limbHolds[limbNumber(frame.performer, nth)];
-      prediction.apply(frame, holder !== null && holder !== this.id);
+      const isHeldByOther = holder !== null && holder !== this.id;
+      if (prediction.apply(frame, isHeldByOther, this.isBonded(prediction.limb))) predicted |= 1 << nth;
     }
+    return predicted;
   }
 
   /** Release all limbs and close the connection. */
@@ -168,6 +195,9 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
         break;
       case "Presence":
         this.onPresence(message);
+        break;
+      case "BondEnd":
+        this.dispatchEvent(new CustomEvent("bondend", { detail: { limbs: message.limbs, reason: message.reason } }));
         break;
       case "Notice":
         this.onNotice(message);

@@ -69,6 +69,7 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.url.searchParams.set("extensions", "true");
+    this.url.searchParams.set("parts", "body,fingers,face,contacts");
     this.now = options.now ?? (() => performance.now());
     const { access = pageAccess, solver = marionetteSolverFactory(access) } = options;
     const origin = this.url.origin.replace(/^ws/, "http");

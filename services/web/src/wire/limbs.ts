@@ -20,3 +20,8 @@ export function performerOfLimb(number: number): number {
 export function limbWithinPerformer(number: number): number {
   return number % LIMBS.length;
 }
+
+/** Returns whether the limb of this number is a hand. */
+export function isHand(number: number): boolean {
+  return limbWithinPerformer(number) < 2;
+}

@@ -33,6 +33,11 @@ const count: FieldParser = (value) => (
 const limb: FieldParser = (value) => (
   count(value), requireValid((value as number) < MAX_LIMBS, `a limb, 0..${MAX_LIMBS - 1}`), value
 );
+const limbPair: FieldParser = (value) => {
+  const pair = list(limb)(value) as unknown[];
+  requireValid(pair.length === 2, "two limbs");
+  return pair;
+};
 const list =
   (item: FieldParser): FieldParser =>
   (value) => {
@@ -111,12 +116,14 @@ export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
     limbs: list(optional(text)),
     asks: asksPerLimb,
     live: optional(list(livePerformer)),
+    bonds: optional(list(limbPair)),
   },
   Problem: { title: text, detail: text },
   Welcome: { id: text, colour: count, lead: count },
   Grant: { limb, epoch: count },
   Refusal: { limb, reason: text, holder: optional(text) },
   Notice: { limb, reason: text, detail: text },
+  BondEnd: { limbs: limbPair, reason: text },
   Choice: { rate: count, reason: text, line: optional(count) },
 };
 
@@ -128,6 +135,7 @@ export const CLIENT_MAP_FIELDS: MapFields<Exclude<MapMessageName, ServerMapName>
   Release: { limb, epoch: count },
   Alive: { limbs: list(limb) },
   Ask: { limb, wanted: flag },
+  Bond: { limbs: limbPair, wanted: flag },
 };
 
 /** Encodes a message: the type byte and the map of its fields that are not null. */

@@ -82,6 +82,8 @@ export interface Presence {
   asks: string[][];
   /** Live performers of the motion, by number; absent: none. */
   live: LivePresence[] | null;
+  /** Bonded hands; absent: none. */
+  bonds: number[][] | null;
 }
 
 /** Answer to a Ping: its `sequence` and `sent`, and the clock times of its arrival and of this answer. */
@@ -150,6 +152,15 @@ export interface Choice {
   reason: string;
   /** Throughput of a constrained link in bit/s, header overhead included. */
   line: number | null;
+}
+
+/** Two hands are not, or no longer, bonded. */
+export interface BondEnd {
+  name: "BondEnd";
+  /** Numbers of two hands, in any order. */
+  limbs: number[];
+  /** A reason of proto/messages.md, 3.7. */
+  reason: string;
 }
 
 /** Clock request. It has the size of the answer, so that both directions take equally long to transmit. */
@@ -231,6 +242,14 @@ export interface Sample {
   rotations: Int16Array;
 }
 
+/** Request to bond two hands, or to end their bond. */
+export interface Bond {
+  name: "Bond";
+  /** Numbers of two hands, in any order. */
+  limbs: number[];
+  wanted: boolean;
+}
+
 export interface PuppeteerPresence {
   id: string;
   name: string;
@@ -257,9 +276,10 @@ export type ServerMessage =
   | Refusal
   | Notice
   | Choice
-  | Live;
+  | Live
+  | BondEnd;
 
-export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample;
+export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond;
 
 export type Message = ServerMessage | ClientMessage;
 
@@ -279,6 +299,7 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Notice: 12,
   Choice: 13,
   Live: LIVE_TYPE,
+  BondEnd: 16,
   Ping: 64,
   Edit: 65,
   Report: 66,
@@ -288,4 +309,5 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Input: 70,
   Ask: 71,
   Sample: 72,
+  Bond: 73,
 };

@@ -124,3 +124,20 @@ describe("velocity", () => {
     expectNear(target.valueAt(200), [0.1, 0, 0]);
   });
 });
+
+test("target of a bonded hand follows the pair once there was no input for a second", () => {
+  const target = new LimbTarget(0);
+  const place = Float64Array.of(0.2, 0.3, 0.4);
+  target.claim(0);
+  target.setTarget(0.5, 0, 0, 0);
+  target.follow(place, 900);
+  expectNear(target.valueAt(900), [0.5, 0, 0]);
+  target.follow(place, 1_100);
+  expectNear(target.valueAt(1_100), [0.2, 0.3, 0.4]);
+  expect(target.hasFollowed).toBe(true);
+  // a movement goes on from there, and is not interrupted
+  target.setVelocity(1, 0, 0, 1_200);
+  expectNear(target.valueAt(1_300), [0.3, 0.3, 0.4]);
+  target.follow(place, 3_000);
+  expectNear(target.valueAt(1_400), [0.4, 0.3, 0.4]);
+});

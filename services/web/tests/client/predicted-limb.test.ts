@@ -33,6 +33,7 @@ class SimulatedStage {
   /** Maximum angular speed of a joint relative to the motion, radians per second. */
   maxSpeed = 0;
   isHeldByOther = false;
+  isBonded = false;
 
   constructor(
     readonly limb: number,
@@ -52,7 +53,7 @@ class SimulatedStage {
     if (overlay) this.pose.rotations.set(overlay, first);
     const overlaidMask = overlay ? 1 << limb : 0;
     const frame = { performer: 0, pose: this.pose, motion: this.motion, overlaidMask, nowMs: this.now };
-    this.prediction.apply({ ...frame, solver: this.solver }, this.isHeldByOther);
+    this.prediction.apply({ ...frame, solver: this.solver }, this.isHeldByOther, this.isBonded);
     for (let joint = 0; joint < 72; joint += 4) {
       const motionStep = rotationAngle(this.motion.rotations, joint, motion.rotations, joint);
       const step = rotationAngle(this.pose.rotations, joint, pose.rotations, joint);
@@ -175,4 +176,30 @@ describe("limb held by another puppeteer", () => {
     after.observePose(stage.pose.rotations, 0);
     [0, 1, 2].forEach((axis) => expect(Math.abs(after.position[axis] - before.position[axis])).toBeLessThan(0.02));
   });
+});
+
+test("a bonded hand is shown as the session sends it, and its target follows after a second without input", () => {
+  const stage = new SimulatedStage(0, 60);
+  const session = new SimulatedStage(0, 60);
+  session.claim();
+  stage.claim();
+  const drawBoth = () => {
+    session.draw();
+    const first = 4 * LIMB_FIRST_JOINTS[0];
+    stage.draw(session.pose.rotations.slice(first, first + 12));
+  };
+  for (let frame = 0; frame < 30; frame++) drawBoth();
+  session.prediction.target.setTarget(0.2, -0.6, 0.3, session.now);
+  stage.isBonded = true;
+  for (let frame = 0; frame < 25; frame++) drawBoth();
+  // the transition from the prediction is over
+  for (let i = 0; i < 72; i++) expect(stage.pose.rotations[i]).toBeCloseTo(session.pose.rotations[i], 12);
+  expect([...stage.prediction.target.value]).toEqual(TARGETS[0]);
+  for (let frame = 0; frame < 60; frame++) drawBoth();
+  const { value, hasFollowed } = stage.prediction.target;
+  expect(hasFollowed).toBe(true);
+  for (const axis of [0, 1, 2]) expect(value[axis]).toBeCloseTo([0.2, -0.6, 0.3][axis], 6);
+  stage.isBonded = false;
+  for (let frame = 0; frame < 40; frame++) drawBoth();
+  expect(stage.maxSpeed).toBeLessThan(25);
 });

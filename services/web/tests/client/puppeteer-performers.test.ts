@@ -2,6 +2,7 @@
 
 import { afterEach, beforeEach, describe, expect, test } from "vitest";
 import { createMarionetteSolver } from "../../src/client/marionette-solver";
+import type { PerformerView } from "../../src/client/performer-view";
 import type { Puppeteer } from "../../src/client/puppeteer";
 import type { Viewer } from "../../src/client/viewer";
 import { copyPose, type Pose, restPose } from "../../src/motion/skeleton";
@@ -10,7 +11,7 @@ import { table } from "../marionette/figure";
 import { advanceTime, endControlSession, now, startControlSession } from "./control-session";
 import type { FakeWebSocket } from "./fake-websocket";
 
-const unheld = (limbs: number) => Array.from({ length: limbs }, () => null);
+const unheld = (limbs: number): (string | null)[] => Array.from({ length: limbs }, () => null);
 const noAsks = (limbs: number): string[][] => Array.from({ length: limbs }, () => []);
 
 let viewer: Viewer;
@@ -30,6 +31,11 @@ beforeEach(async () => {
 });
 
 afterEach(() => endControlSession({ viewer, viewerSocket, puppeteer, socket }));
+
+/** Receive who holds each limb, and who asks for it. */
+function receivePresence(limbs: (string | null)[], asks = noAsks(limbs.length)): void {
+  socket.receive({ name: "Presence", live: null, bonds: null, viewers: 2, puppeteers: [], limbs, asks });
+}
 
 /** Return the current poses of both performers. */
 function currentPoses(): Pose[] {
@@ -96,6 +102,19 @@ describe("own limb of another performer", () => {
     expect(after[1].rotations.subarray(60)).toEqual(second.rotations.subarray(60));
   });
 
+  test("counts as controlled, also without overlays of the session, until it is back in the motion", () => {
+    const controlled = () => viewer.performers.map((performer) => (performer as PerformerView).controlledLimbs);
+    currentPoses();
+    expect(controlled()).toEqual([0, 0]);
+    puppeteer.claim(6);
+    puppeteer.target(6, 0.5, 0, 0);
+    draw(300);
+    expect(controlled()).toEqual([0, 0b100]);
+    puppeteer.release(6);
+    draw(3_000);
+    expect(controlled()).toEqual([0, 0]);
+  });
+
   test("and the same limb of the first move independently", () => {
     puppeteer.claim(0);
     puppeteer.claim(4);
@@ -108,14 +127,7 @@ describe("own limb of another performer", () => {
 
   test("is shown as the session sends it while another puppeteer holds it", () => {
     const before = currentPoses();
-    socket.receive({
-      name: "Presence",
-      live: null,
-      viewers: 2,
-      puppeteers: [],
-      limbs: [null, null, null, null, "b2", null, null, null],
-      asks: noAsks(8),
-    });
+    receivePresence([...unheld(4), "b2", ...unheld(3)]);
     puppeteer.claim(4);
     puppeteer.target(4, 0.5, -0.3, 0.4);
     expect(draw(200)).toEqual(before);
@@ -141,29 +153,15 @@ describe("change to a motion with fewer performers", () => {
   });
 
   test("ends requests for removed limbs, not as free", () => {
-    socket.receive({
-      name: "Presence",
-      live: null,
-      viewers: 2,
-      puppeteers: [],
-      limbs: [...unheld(4), "b2", ...unheld(3)],
-      asks: noAsks(8),
-    });
+    receivePresence([...unheld(4), "b2", ...unheld(3)]);
     puppeteer.ask(4);
-    socket.receive({
-      name: "Presence",
-      live: null,
-      viewers: 2,
-      puppeteers: [],
-      limbs: [...unheld(4), "b2", ...unheld(3)],
-      asks: [...noAsks(4), ["a1"], ...noAsks(3)],
-    });
+    receivePresence([...unheld(4), "b2", ...unheld(3)], [...noAsks(4), ["a1"], ...noAsks(3)]);
     expect(puppeteer.isAsking(4)).toBe(true);
-    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
+    receivePresence(unheld(4));
     expect([puppeteer.isAsking(4), events]).toEqual([false, [["lapsed", { limb: 4, free: false }]]]);
     // a request that Presence never listed lapses, too
     puppeteer.ask(5);
-    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: [], limbs: unheld(4), asks: noAsks(4) });
+    receivePresence(unheld(4));
     expect([puppeteer.isAsking(5), events[1]]).toEqual([false, ["lapsed", { limb: 5, free: false }]]);
     // no puppeteer holds it any more
     const before = tipPosition(4);

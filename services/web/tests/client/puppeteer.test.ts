@@ -136,9 +136,41 @@ describe("limb", () => {
   });
 });
 
+describe("a bond of two hands", () => {
+  const presence = (bonds: number[][] | null) =>
+    socket.receive({
+      name: "Presence",
+      live: null,
+      bonds,
+      viewers: 1,
+      puppeteers: [],
+      limbs: ["a1", null, null, null],
+      asks: [[], [], [], []],
+    });
+
+  test("is requested and ended, and its state follows the session", () => {
+    puppeteer.bond(0, 1);
+    expect(socket.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [0, 1], wanted: true }]);
+    expect([puppeteer.isBonded(0), puppeteer.bonds]).toEqual([false, []]);
+    presence([[0, 1]]);
+    expect([puppeteer.isBonded(1), puppeteer.isBonded(2), puppeteer.bonds]).toEqual([true, false, [[0, 1]]]);
+    puppeteer.unbond(0, 1);
+    expect(socket.messagesOf("Bond").at(-1)?.wanted).toBe(false);
+    presence(null);
+    expect(puppeteer.isBonded(0)).toBe(false);
+  });
+
+  test("reports its end with the reason", () => {
+    const ends: unknown[] = [];
+    puppeteer.addEventListener("bondend", (event) => ends.push((event as CustomEvent).detail));
+    socket.receive({ name: "BondEnd", limbs: [0, 5], reason: "apart" });
+    expect(ends).toEqual([{ limbs: [0, 5], reason: "apart" }]);
+  });
+});
+
 describe("request for a limb that another puppeteer holds", () => {
   const presence = (limbs: (string | null)[], asks: string[][]) =>
-    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: [], limbs, asks });
+    socket.receive({ name: "Presence", live: null, bonds: null, viewers: 2, puppeteers: [], limbs, asks });
   const held = ["b2", null, null, null];
   let events: unknown[];
 
@@ -364,6 +396,7 @@ describe("own limb", () => {
     socket.receive({
       name: "Presence",
       live: null,
+      bonds: null,
       viewers: 2,
       puppeteers: [],
       limbs: ["b2", null, null, null],

@@ -3,6 +3,7 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
 import { Viewer } from "../../src/client/viewer";
 import type { Message } from "../../src/wire/messages";
+import { contactVectors } from "../golden-contacts";
 import { extensionVectors, goldenDescription as goldenExtension } from "../golden-extensions";
 import { type BlockVectors, goldenDescription } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";
@@ -93,4 +94,20 @@ test("a damaged block of an extension is counted, and the pose stays", async () 
   FakeWebSocket.last.receive(data(1, new Uint8Array(70_000)));
   expect(viewer.statistics().reason).toMatch(/could not be read/);
   expect(viewer.poseAt(0)?.extended).toBeTruthy();
+});
+
+test("a pose has the contacts of its feet, without those of a controlled leg", async () => {
+  const { tracks, valid } = contactVectors();
+  start({ ...description(), tracks: [goldenDescription(), tracks[0]] } as Message, data(0, motionBlock));
+  FakeWebSocket.last.receive(data(1, decodeBase64(valid[0].block)));
+  await vi.waitFor(() => expect(viewer.poseAt(0)?.contacts).toEqual({ planted: 3, controlled: 0, clock: EPOCH_US }));
+  const limbs = new Map([[2, new Int16Array(9)]]);
+  FakeWebSocket.last.receive({ name: "Overlay", sequence: 0, due: EPOCH_US, limbs, earlier: [] });
+  expect(viewer.poseAt(0)?.contacts).toEqual({ planted: 2, controlled: 1, clock: EPOCH_US });
+});
+
+test("contacts of a motion without their track are not known", async () => {
+  start(description(extension()), data(0, motionBlock), data(1, extensionBlock));
+  await vi.waitFor(() => expect(viewer.poseAt(0)?.extended).toBeTruthy());
+  expect(viewer.poseAt(0)?.contacts).toBeNull();
 });

@@ -48,6 +48,7 @@ describe("start", () => {
     FakeWebSocket.last.receive({
       name: "Presence",
       live: null,
+      bonds: null,
       viewers: 1,
       puppeteers: [],
       limbs: [null, null, null, null],

@@ -72,6 +72,7 @@ test("asks has one list per limb, for any number of performers", () => {
   const presence = (limbs: number, asks: number): Message => ({
     name: "Presence",
     live: null,
+    bonds: null,
     viewers: 1,
     puppeteers: [],
     limbs: Array.from({ length: limbs }, () => null),
@@ -86,9 +87,25 @@ test("asks has one list per limb, for any number of performers", () => {
   }
 });
 
+test("a bond has two limbs of 0..15", () => {
+  const bond = (limbs: number[]): Message => ({ name: "Bond", limbs, wanted: true });
+  expect(unpack(pack(bond([0, 5])))).toEqual(bond([0, 5]));
+  for (const limbs of [[], [0], [0, 1, 4]])
+    expect(() => unpack(pack(bond(limbs)))).toThrow("Bond, limbs: expected two limbs");
+  expect(() => unpack(pack(bond([0, 16])))).toThrow("Bond, limbs: expected a limb, 0..15");
+});
+
 test("live performer has a number of 0..3, an id and a name", () => {
   const presence = (entry: object): Message =>
-    ({ name: "Presence", viewers: 1, puppeteers: [], limbs: [], asks: [], live: [entry] }) as unknown as Message;
+    ({
+      name: "Presence",
+      viewers: 1,
+      puppeteers: [],
+      limbs: [],
+      asks: [],
+      live: [entry],
+      bonds: null,
+    }) as unknown as Message;
   const valid = presence({ performer: 3, id: "p", name: "Aiko" });
   expect(unpack(pack(valid))).toEqual(valid);
   expect(() => unpack(pack(presence({ performer: 4, id: "p", name: "Aiko" })))).toThrow(
