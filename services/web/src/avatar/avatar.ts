@@ -2,8 +2,8 @@
  * A user's own figure in the puppet's place. Its limbs point in the same directions as the streamed figure's, whatever
  * pose its file rests in: the rest direction of each bone is aligned with the figure's, and streamed rotations are
  * converted to the file's axes. Its size follows the lengths of trunk and limbs; its path over the floor is scaled by
- * the ratio of the hips' heights, and its lowest foot is at the height of the figure's, so that feet neither slide nor
- * sink.
+ * the ratio of the hips' heights, and its lowest foot is at the height of the figure's. Planted feet are then kept in
+ * place (`PlantedFeet`).
  */
 import { Group, Matrix4, type Object3D, Quaternion, Vector3 } from "three";
 import type { StagedPose } from "../motion/extension";
@@ -11,8 +11,11 @@ import { BONES, tPoseFigure } from "../motion/humanoid";
 import { createWorldTransforms, type Figure, JOINTS, worldTransforms } from "../motion/skeleton";
 import { figureScale, restPositions, totalLimbLength } from "../stage/puppet/figure-fit";
 import { floorHeight, handlePosition, type Performer } from "../stage/puppet/performer";
+import { PlantedFeet } from "../stage/puppet/planted-feet";
 import { SOLE_HEIGHT_M } from "../stage/puppet/standard-figure";
 import { BoneOrientations } from "./bone-orientations";
+import { FaceDrive } from "./face/face-drive";
+import { FingerDrive } from "./hands/finger-drive";
 import { SimpleMaterials } from "./materials";
 import type { AvatarModel } from "./model";
 
@@ -56,6 +59,9 @@ export class Avatar implements Performer {
   readonly #materials: SimpleMaterials;
   readonly #drives: BoneDrive[] = [];
   readonly #orientations: BoneOrientations;
+  readonly #fingers: FingerDrive;
+  readonly #face: FaceDrive;
+  readonly #feet: PlantedFeet;
   readonly #rotations: Float64Array;
   readonly #streamedWorld = createWorldTransforms();
   readonly #joints: ReadonlyMap<string, Matrix4>;
@@ -86,7 +92,19 @@ export class Avatar implements Performer {
     this.height = Math.min(avatarScale * (topHeight - soleHeight), MAX_FRAMED_HEIGHT_M * this.scale);
     this.#orientations = new BoneOrientations((bone) => model.nodes.has(bone));
     this.#rotations = new Float64Array(this.#orientations.bones.length * 4);
-    this.#alignBones(figure);
+    this.#fingers = new FingerDrive(model, this.#alignBones(figure));
+    this.#face = new FaceDrive(model);
+    this.#feet = new PlantedFeet(
+      this.group,
+      ["left", "right"].map((side) => {
+        const node = (bone: string) => model.nodes.get(`${side}${bone}`) as Object3D;
+        const [, ball] = model.rest.solePoints.get(`${side}Foot`) as readonly Vector3[];
+        const hip = node("UpperLeg");
+        const { postRotation } = this.#drives.find((drive) => drive.node === hip) as BoneDrive;
+        const hinge = new Vector3(1, 0, 0).applyQuaternion(postRotation.clone().invert());
+        return { hip, knee: node("LowerLeg"), ankle: node("Foot"), hinge, ball };
+      }),
+    );
 
     const rest = restPositions(figure);
     const joint = (name: string) => rest.get(name) as Vector3;
@@ -131,7 +149,7 @@ export class Avatar implements Performer {
     this.#materials.useSimple(on);
   }
 
-  apply(pose: StagedPose, seconds: number): void {
+  apply(pose: StagedPose, seconds: number, blink = 0): void {
     const { figure, group } = this;
     const world = worldTransforms(figure, pose, this.#streamedWorld);
     const { positions, orientations } = world;
@@ -154,6 +172,7 @@ export class Avatar implements Performer {
         .premultiply(preRotation)
         .multiply(postRotation);
     }
+    this.#fingers.apply(pose.hands ?? null);
     group.position.set(0, 0, 0);
     group.updateMatrixWorld(true);
     const hips = this.#hipCentre(scratchCentre);
@@ -167,7 +186,9 @@ export class Avatar implements Performer {
       this.#rootScale * figureHips.z - hips.z,
     );
     group.updateMatrixWorld(true);
+    this.#feet.apply(pose.contacts ?? null);
     this.root.copy(this.joint("humanoid_root")).setPosition(this.#hipCentre(scratchCentre));
+    this.#face.apply(pose.face ?? null, blink);
     const { vrm } = this.#model;
     if (vrm && seconds === 0) vrm.springBoneManager?.reset();
     vrm?.update(seconds);
@@ -196,8 +217,11 @@ export class Avatar implements Performer {
     this.#model.root.removeFromParent();
   }
 
-  /** Align each limb's rest direction with the figure's, and prepare the rotations of its nodes. */
-  #alignBones(figure: Figure): void {
+  /**
+   * Align each limb's rest direction with the figure's, and prepare the rotations of its nodes. Return the rotations
+   * from the file's rest to the T-pose by bone.
+   */
+  #alignBones(figure: Figure): Map<string, Quaternion> {
     const { bones } = this.#model.rest;
     const { offsets, tips } = tPoseFigure(figure);
     const alignments = new Map<string, Quaternion>();
@@ -229,6 +253,7 @@ export class Avatar implements Performer {
         postRotation: alignment.clone().multiply(rest.rotation),
       });
     });
+    return alignments;
   }
 
   /** Return the handle's position in the frame of its node at rest: in the palm, or on the knee. */

@@ -3,8 +3,10 @@
  * skeleton's shape.
  */
 import type { Vector3 } from "three";
+import { FINGERS, VRM_NAMES } from "../motion/hands";
+import { findFingers } from "./hands/finger-names";
 import { splitWords } from "./naming/joint-name";
-import { ancestorChain, commonAncestor, isDescendant } from "./naming/joint-tree";
+import { ancestorChain, commonAncestor } from "./naming/joint-tree";
 import { findHeadByName, mapByName, mapPartly } from "./naming/name-mapping";
 import { SIDE_WORDS } from "./naming/naming-profile";
 import { findHead, mapByShape, swapSides } from "./naming/shape-mapping";
@@ -61,13 +63,17 @@ export function findBones(tree: JointTree): Map<string, number> {
   if (!joints) return new Map();
   const head = joints.get("skullbase") ?? findHeadByName(names, parents, joints) ?? findHead(tree, joints);
   const bones = new Map<string, number>();
-  for (const [letter, side] of Object.entries(SIDES)) {
+  for (const [index, [letter, side]] of Object.entries(SIDES).entries()) {
     for (const [joint, bone] of Object.entries(LIMB_BONES)) {
       const found = joints.get(`${letter}_${joint}`) ?? endOfLimb(tree, joints, letter, joint);
       if (found !== undefined) bones.set(side + bone, found);
     }
-    const finger = findMiddleFinger(tree, bones.get(`${side}Hand`));
-    if (finger !== undefined) bones.set(`${side}MiddleProximal`, finger);
+    const hand = bones.get(`${side}Hand`);
+    if (hand === undefined) continue;
+    findFingers(names, parents, hand).forEach((chain, finger) => {
+      const bonesOfFinger = VRM_NAMES[index * FINGERS.length + finger];
+      chain.forEach((found, place) => bones.set(bonesOfFinger[place], found));
+    });
   }
   if (head !== undefined) bones.set("head", head);
   addTrunk(parents, bones);
@@ -118,16 +124,6 @@ function endOfLimb(
   if (children.length !== 1 || splitWords(names[children[0]]).some((word) => TWIST_WORDS.includes(word)))
     return undefined;
   return children[0];
-}
-
-/** Return the first joint of the middle finger below a hand; undefined if none is named so. */
-function findMiddleFinger({ names, parents }: JointTree, hand: number | undefined): number | undefined {
-  if (hand === undefined) return undefined;
-  const found = names.findIndex((name, joint) => {
-    const words = splitWords(name);
-    return words.includes("middle") && !words.includes("metacarpal") && isDescendant(parents, joint, hand);
-  });
-  return found < 0 ? undefined : found;
 }
 
 /**

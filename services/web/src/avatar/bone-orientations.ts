@@ -47,7 +47,10 @@ export class BoneOrientations {
     this.world = new Float64Array(this.bones.length * 4);
   }
 
-  /** Write the rotation [bone][w x y z] of each bone from the T-pose, in the frame of its parent; that of the hips in the world. */
+  /**
+   * Write the rotation [bone][w x y z] of each bone from the T-pose, in the frame of its parent; that of the hips in
+   * the world.
+   */
   rotations(world: WorldTransforms, extended: ExtendedPose | null, out: Float64Array): void {
     const { bones, parents, inverse } = this;
     const trunk = TRUNK_BONES.filter((bone) => bones.includes(bone));

@@ -107,10 +107,15 @@ function vrmBones(json: GltfJson): { name: string | null; bones: Map<string, num
   if (extensions.VRM) {
     const { meta, humanoid } = asRecord(extensions.VRM);
     const bones = asList(asRecord(humanoid).humanBones).map((at): [string, number] => [
-      String(asRecord(at).bone),
+      newThumbName(String(asRecord(at).bone)),
       Number(asRecord(at).node),
     ]);
     return { name: cleanName(asText(asRecord(meta).title)), bones: new Map(bones) };
   }
   return null;
+}
+
+/** Return VRM 1's name of a VRM 0 bone: those of the thumb's joints are one joint further out. */
+function newThumbName(bone: string): string {
+  return bone.replace("ThumbProximal", "ThumbMetacarpal").replace("ThumbIntermediate", "ThumbProximal");
 }

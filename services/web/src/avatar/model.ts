@@ -8,9 +8,10 @@ import { type GLTF, GLTFLoader, type GLTFParser } from "three/examples/jsm/loade
 import { translate } from "../i18n/translator";
 import { Decoders } from "./decoding/decoders";
 import { AvatarError, fileBroken } from "./error";
+import { type EyeBone, findEyeBones } from "./face/eye-bones";
 import { type AvatarFile, parseAvatarFile } from "./file";
 import { dimMToonMaterials, simplifyMaterials } from "./materials";
-import { measureRest, type RestMeasurements } from "./rest-pose";
+import { FINGER_BONES, measureRest, type RestMeasurements } from "./rest-pose";
 import { findTrunkBones } from "./trunk-bones";
 
 /** Minimum distance between two bones, as a share of the height: shorter, a bone has no direction. */
@@ -35,6 +36,8 @@ export class AvatarModel {
   /** Contains the file's scene, rotated to face z; an avatar scales it. */
   readonly root = new Group();
   readonly rest: RestMeasurements;
+  /** Bones of the eyes, if the file has both. */
+  readonly eyes: readonly EyeBone[];
 
   private constructor(
     readonly name: string,
@@ -45,6 +48,7 @@ export class AvatarModel {
     this.root.name = "avatar";
     this.root.add(scene);
     this.rest = measureRest(this.root, nodes);
+    this.eyes = findEyeBones(nodes);
     const materials = new Set<Material>();
     scene.traverse((object) => {
       if (!(object instanceof Mesh)) return;
@@ -139,7 +143,8 @@ export class AvatarModel {
     }
     for (const [bone, node] of this.nodes) {
       if (!isBelow(node, this.root)) throw new Error(`${bone} is not in the scene`);
-      if (!(Math.abs(node.matrixWorld.determinant()) > 0)) throw new Error(`${bone} is scaled to nothing`);
+      if (!FINGER_BONES.includes(bone) && !(Math.abs(node.matrixWorld.determinant()) > 0))
+        throw new Error(`${bone} is scaled to nothing`);
     }
     // A hand's mesh gives the position of its handle.
     const extents = [topHeight - soleHeight, ...this.rest.handLengths.values()];

@@ -1,11 +1,11 @@
 /** Measurements of a model's rest pose: facing, bone positions, and the points that touch the floor. */
 import { type BufferAttribute, type Group, Mesh, type Object3D, Quaternion, SkinnedMesh, Vector3 } from "three";
+import { VRM_NAMES } from "../motion/hands";
 import { BONES } from "../motion/humanoid";
 import { DRIVEN_BONES } from "./bone-orientations";
 
 const UP = new Vector3(0, 1, 0);
-/** Bones that give the direction of a hand, besides the driven ones. */
-const FINGER_BONES = ["leftMiddleProximal", "rightMiddleProximal"];
+export const FINGER_BONES: readonly string[] = VRM_NAMES.flat();
 /** Position of the ball in a foot without toes, as a share of the way from ankle to front. */
 const BALL_SHARE = 0.7;
 
@@ -33,6 +33,8 @@ export interface RestMeasurements {
   solePoints: ReadonlyMap<string, readonly Vector3[]>;
   /** Length from each hand bone to the finger tips, as far as its mesh reaches. */
   handLengths: ReadonlyMap<string, number>;
+  /** Positions of the ends of finger bones that have a node there. */
+  fingerTips: ReadonlyMap<string, Vector3>;
 }
 
 /**
@@ -71,6 +73,12 @@ export function measureRest(stand: Group, nodes: ReadonlyMap<string, Object3D>):
     solePoints: new Map(SIDES.map((side, at) => [`${side}Foot`, solePointsOf(side, nodes, feet[at], lowest)])),
     handLengths: new Map(
       SIDES.map((side) => [`${side}Hand`, handLength(side, nodes, clouds.get(`${side}Hand`) ?? [])]),
+    ),
+    fingerTips: new Map(
+      FINGER_BONES.flatMap((bone): [string, Vector3][] => {
+        const end = nodes.get(bone)?.children.find((child) => !(child instanceof Mesh));
+        return end ? [[bone, positionOf(end)]] : [];
+      }),
     ),
   };
 }

@@ -3,7 +3,7 @@
 import { applyPlacement } from "../motion/placement";
 import { restPose } from "../motion/skeleton";
 import { ExportSkeleton } from "./export-skeleton";
-import { extensionValuesAt, FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
+import { FRAMES_PER_STEP, frameValuesAt, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
 const CENTIMETRES_PER_METRE = 100;
 const DEGREES_PER_RADIAN = 180 / Math.PI;
@@ -18,7 +18,7 @@ const encoder = new TextEncoder();
 export function* writeBvh(motion: SampledMotion): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const { fps, frames, placement: place } = motion;
   const frameTime = Number((1 / fps).toPrecision(10));
-  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension);
+  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension, motion.hands?.hands);
   const parts = [
     encoder.encode(
       [...formatHierarchy(skeleton), "MOTION", `Frames: ${frames}`, `Frame Time: ${frameTime}`, ""].join("\n"),
@@ -29,7 +29,7 @@ export function* writeBvh(motion: SampledMotion): IncrementalTask<Uint8Array<Arr
   const pose = restPose();
   let rows = "";
   for (let frame = 0; frame < frames; frame++) {
-    skeleton.rotations(applyPlacement(poseAt(motion, frame, pose), place), extensionValuesAt(motion, frame), rotations);
+    skeleton.rotations(applyPlacement(poseAt(motion, frame, pose), place), frameValuesAt(motion, frame), rotations);
     for (let axis = 0; axis < 3; axis++) values[axis] = pose.root[axis] * CENTIMETRES_PER_METRE;
     for (let joint = 0; joint < skeleton.count; joint++) toEulerZxy(values, 3 + joint * 3, rotations, joint * 4);
     rows += `${formatRow(values)}\n`;

@@ -2,10 +2,9 @@
 
 import { type Figure, figureKey } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
-import type { ExtensionBlockStore } from "../playout/extension-poses";
 import { writeBvh } from "./bvh";
 import { type AnimatedPuppet, type PuppetModel, writeGlb } from "./glb";
-import { type IncrementalTask, type SampledMotion, sampleMotion } from "./sampled-motion";
+import { type ExtensionStores, type IncrementalTask, type SampledMotion, sampleMotion } from "./sampled-motion";
 import { runInSlices } from "./time-slice";
 import { writeVrma } from "./vrma";
 
@@ -29,12 +28,11 @@ export interface ExportOptions {
   signal?: AbortSignal;
 }
 
-/** Blocks of a performer, and the number of frames to export. */
+/** Blocks of a performer and of its extensions, and the number of frames to export. */
 export interface ExportSource {
   store: MotionBlockStore;
   frames: number;
-  /** Blocks of its extension, if it has one. */
-  extension?: ExtensionBlockStore | null;
+  extensions?: ExtensionStores;
 }
 
 /**
@@ -53,10 +51,10 @@ export async function exportFile(
   });
   const motions: SampledMotion[] = [];
   const sampleShare = 0.5 / sources.length;
-  for (const { store, frames, extension } of sources)
+  for (const { store, frames, extensions } of sources)
     motions.push(
       await runInSlices(
-        sampleMotion(store, frames, extension),
+        sampleMotion(store, frames, extensions),
         sliceOptions(motions.length * sampleShare, (motions.length + 1) * sampleShare),
       ),
     );

@@ -6,8 +6,9 @@ import { CLAVICLE_NAMES, NECK_NAME, type StagedPose } from "../motion/extension"
 import type { Placement } from "../motion/placement";
 import { type Figure, JOINTS, restPose } from "../motion/skeleton";
 import { ExportSkeleton } from "./export-skeleton";
+import { addFaceChannel, createHeadMesh, type PuppetHead, targetNames } from "./glb-face";
 import { frameTimes, type GltfArray, GltfBuilder, writeRotation } from "./gltf";
-import { extensionValuesAt, FRAMES_PER_STEP, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
+import { FRAMES_PER_STEP, frameValuesAt, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
 /** The puppet of one performer as a mesh in its rest pose, and the movement of its two sleeves. */
 export interface PuppetModel {
@@ -23,6 +24,8 @@ export interface PuppetModel {
   /** Triangles with the face texture, and all others. */
   face: Uint32Array<ArrayBuffer>;
   body: Uint32Array<ArrayBuffer>;
+  /** Return the head as a mesh of its own, and the triangles of all other parts. */
+  separateHead(): { head: PuppetHead; rest: Uint32Array<ArrayBuffer> };
   /**
    * Write the sleeves' rotations (8, w x y z) in their shoulders' frames for `pose`, `seconds` after the last one; 0
    * for the first.
@@ -43,7 +46,7 @@ export interface AnimatedPuppet {
 /**
  * Write all puppets as one scene with one animation of this name. Each hangs from its own node, "dancer 1" and so on,
  * at its placement on the stage; a single one at the centre needs none. `face` is the face texture as PNG; without it
- * faces are white.
+ * faces are white. The heads of those whose motion has a face are meshes with morph targets.
  */
 export function* writeGlb(
   puppets: readonly AnimatedPuppet[],
@@ -51,25 +54,30 @@ export function* writeGlb(
   face: Uint8Array<ArrayBuffer> | null,
 ): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const asset = new GltfBuilder();
-  const { bones, roots } = addPuppets(asset, puppets, face);
+  const { bones, faces, roots } = addPuppets(asset, puppets, face);
   for (const [index, puppet] of puppets.entries()) {
-    for (const share of addAnimation(asset, bones[index], puppet)) yield (index + share) / puppets.length;
+    for (const share of addAnimation(asset, bones[index], faces[index], puppet)) yield (index + share) / puppets.length;
   }
   return asset.build(roots, name);
 }
 
-/** Animate the joints and sleeves, which are the nodes from `first` on. */
-function* addAnimation(asset: GltfBuilder, first: number, { motion, model }: AnimatedPuppet): IncrementalTask<void> {
+/** Animate the joints and sleeves, which are the nodes from `first` on, and the node of the face, if there is one. */
+function* addAnimation(
+  asset: GltfBuilder,
+  first: number,
+  face: number | undefined,
+  { motion, model }: AnimatedPuppet,
+): IncrementalTask<void> {
   const { fps, frames, roots } = motion;
-  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension);
+  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension, motion.hands?.hands);
   const rotations = Array.from({ length: skeleton.count + SLEEVES.length }, () => new Float32Array(frames * 4));
   const pose: StagedPose = restPose();
   const sleeveRotations = new Float64Array(8),
     jointRotations = new Float64Array(skeleton.count * 4);
   for (let frame = 0; frame < frames; frame++) {
-    const values = extensionValuesAt(motion, frame);
+    const values = frameValuesAt(motion, frame);
     skeleton.rotations(poseAt(motion, frame, pose), values, jointRotations);
-    pose.extended = skeleton.extend(pose, values);
+    pose.extended = skeleton.extend(pose, values.extension);
     model.poseSleeves(pose, frame === 0 ? 0 : 1 / fps, sleeveRotations);
     for (let joint = 0; joint < skeleton.count; joint++)
       writeRotation(rotations[joint], frame * 4, jointRotations, joint * 4);
@@ -80,6 +88,7 @@ function* addAnimation(asset: GltfBuilder, first: number, { motion, model }: Ani
   const times = asset.addAccessor(frameTimes(frames, fps), "SCALAR", { bounded: true });
   asset.addChannel(first, "translation", times, Float32Array.from(roots));
   rotations.forEach((turn, bone) => asset.addChannel(first + bone, "rotation", times, turn));
+  if (face !== undefined) addFaceChannel(asset, face, motion, times);
 }
 
 /** Skin of a puppet: the joints that move its mesh, by index in the skeleton, and where the mesh has them at rest. */
@@ -91,35 +100,41 @@ interface PuppetSkin {
   skinOf: number[];
 }
 
-/** Add the puppets at rest. Return the first bone's node of each, and the roots of the scene. */
+/** Add the puppets at rest. Return the nodes of the first bone and of the face of each, and the roots of the scene. */
 function addPuppets(
   asset: GltfBuilder,
   puppets: readonly AnimatedPuppet[],
   face: Uint8Array<ArrayBuffer> | null,
-): { bones: number[]; roots: number[] } {
+): { bones: number[]; faces: (number | undefined)[]; roots: number[] } {
   const { nodes } = asset;
   const meshes: object[] = [],
     skins: object[] = [],
     bones: number[] = [],
+    faces: (number | undefined)[] = [],
     roots: number[] = [];
-  const shared = new Map<PuppetModel, Map<string, { mesh: number; inverseBindMatrices: number }>>();
-  puppets.forEach(({ motion: { figure, placement: place, extension }, model }, index) => {
+  const shared = new Map<PuppetModel, Map<string, SharedParts>>();
+  puppets.forEach(({ motion, model }, index) => {
+    const { figure, placement: place, extension, hands } = motion;
     const first = nodes.length;
-    const skeleton = new ExportSkeleton(figure, extension?.extension);
+    const skeleton = new ExportSkeleton(figure, extension?.extension, hands?.hands);
     addBones(asset, skeleton);
     const skin = createSkin(figure, skeleton);
-    const variants = shared.get(model) ?? new Map<string, { mesh: number; inverseBindMatrices: number }>();
+    const variants = shared.get(model) ?? new Map<string, SharedParts>();
     shared.set(model, variants);
     const key = skin.places.join();
-    const parts = variants.get(key) ?? {
-      mesh: meshes.push(addMesh(asset, model, skin)) - 1,
-      inverseBindMatrices: addInverseBindMatrices(asset, skin),
+    const common: SharedParts = variants.get(key) ?? {
+      attributes: addAttributes(asset, model, skin),
+      parts: new Map(),
     };
-    variants.set(key, parts);
+    variants.set(key, common);
+    const targets = targetNames(motion);
+    const parts = common.parts.get(targets.join()) ?? addParts(asset, meshes, common, model, skin, targets);
+    common.parts.set(targets.join(), parts);
+    common.inverseBindMatrices ??= addInverseBindMatrices(asset, skin);
     skins.push({
       joints: skin.joints.map((joint) => first + joint),
       skeleton: first,
-      inverseBindMatrices: parts.inverseBindMatrices,
+      inverseBindMatrices: common.inverseBindMatrices,
     });
     const needsNode = puppets.length > 1 || place.x !== 0 || place.z !== 0 || place.turn !== 0;
     // A skin moves its mesh by the bones alone, so the mesh has no parent.
@@ -127,6 +142,11 @@ function addPuppets(
     const puppet = nodes.push({ name, mesh: parts.mesh, skin: index }) - 1;
     roots.push(needsNode ? addPlacementNode(asset, `dancer ${index + 1}`, place, first) : first, puppet);
     bones.push(first);
+    const faceName = needsNode ? `face ${index + 1}` : "face";
+    // A mesh of its own, since three.js finds the morph targets of an animation by the mesh's name.
+    const head = parts.head && nodes.push({ name: faceName, mesh: meshes.push(parts.head) - 1, skin: index }) - 1;
+    if (head) roots.push(head);
+    faces.push(head);
   });
   const painted = face ? { baseColorTexture: { index: 0 } } : {};
   Object.assign(asset.extraProperties, {
@@ -140,7 +160,42 @@ function addPuppets(
       ? { textures: [{ source: 0 }], images: [{ bufferView: asset.addBufferView(face), mimeType: "image/png" }] }
       : {}),
   });
-  return { bones, roots };
+  return { bones, faces, roots };
+}
+
+/** Mesh of a puppet, and that of its head, if it has morph targets. */
+interface PuppetParts {
+  mesh: number;
+  head: object | undefined;
+}
+
+/** Accessors that puppets of one model and skin share, and their meshes by the names of the morph targets. */
+interface SharedParts {
+  attributes: Record<string, number>;
+  inverseBindMatrices?: number;
+  parts: Map<string, PuppetParts>;
+}
+
+function addParts(
+  asset: GltfBuilder,
+  meshes: object[],
+  { attributes }: SharedParts,
+  model: PuppetModel,
+  { skinOf }: PuppetSkin,
+  targets: readonly string[],
+): PuppetParts {
+  const separate = targets.length > 0 ? model.separateHead() : null;
+  const triangles = separate ? [separate.rest] : [model.body, model.face];
+  const primitives = triangles.map((indices, material) => ({
+    attributes,
+    material,
+    indices: asset.addAccessor(indices, "SCALAR", { target: "indices" }),
+  }));
+  const skull = skinOf[JOINTS.indexOf("skullbase")];
+  return {
+    mesh: meshes.push({ name: "figure", primitives }) - 1,
+    head: separate ? createHeadMesh(asset, separate.head, skull, targets) : undefined,
+  };
 }
 
 /** Add the joints of a skeleton and the sleeves as nodes at rest. */
@@ -161,13 +216,14 @@ function addBones({ nodes }: GltfBuilder, { names, parents, offsets, count }: Ex
 /**
  * Return the skin of a puppet's mesh. Limbs and head are bound where the mesh has them, which is where the figure does.
  * A bone of the trunk, which an extension gives other lengths, carries one point of the mesh to its place: the neck the
- * base of the head, a clavicle the shoulder, the chest the middle of the shoulders.
+ * base of the head, a clavicle the shoulder, the chest the middle of the shoulders. Fingers are bones of the skin, but
+ * move nothing of the mesh, whose hands are rigid.
  */
 function createSkin(figure: Figure, skeleton: ExportSkeleton): PuppetSkin {
   const rest = skeleton.restPositions(),
     figureRest = new ExportSkeleton(figure).restPositions();
   const vl5 = skeleton.indexOf("vl5");
-  const bends = skeleton.names.length > JOINTS.length && skeleton.chest > 0;
+  const bends = skeleton.hasExtension && skeleton.chest > 0;
   const chest = bends ? skeleton.chest : vl5;
   const orChest = (name: string) => (skeleton.indexOf(name) < 0 ? chest : skeleton.indexOf(name));
   const trunk = [
@@ -198,6 +254,12 @@ function createSkin(figure: Figure, skeleton: ExportSkeleton): PuppetSkin {
       return rest[joint * 3 + axis] + moved.reduce((sum, value) => sum + value, 0) / moved.length;
     });
   }
+  for (const joint of skeleton.fingerJoints) {
+    const wrist = skeleton.wristOf(joint);
+    const moved = (axis: number) => skin.places[skin.joints.indexOf(wrist) * 3 + axis] - rest[wrist * 3 + axis];
+    skin.places.push(...[0, 1, 2].map((axis) => rest[joint * 3 + axis] + moved(axis)));
+    skin.joints.push(joint);
+  }
   return skin;
 }
 
@@ -213,27 +275,34 @@ function addPlacementNode({ nodes }: GltfBuilder, name: string, { x, z, turn }: 
   );
 }
 
-/** Return the puppet's mesh, for a skin. */
-function addMesh(asset: GltfBuilder, model: PuppetModel, { skinOf }: PuppetSkin): object {
+/** Add the vertices of a puppet's mesh for a skin. Return their accessors. */
+function addAttributes(asset: GltfBuilder, model: PuppetModel, { skinOf }: PuppetSkin): Record<string, number> {
   const vertices = (values: GltfArray, type: "VEC2" | "VEC3" | "VEC4", bounded = false) =>
     asset.addAccessor(values, type, { target: "vertices", bounded });
-  const attributes = {
+  const { joints, weights } = mergeWeights(model, skinOf);
+  return {
     POSITION: vertices(model.positions, "VEC3", true),
     NORMAL: vertices(model.normals, "VEC3"),
     COLOR_0: vertices(model.colours, "VEC3"),
     TEXCOORD_0: vertices(model.faceUvs, "VEC2"),
-    JOINTS_0: vertices(
-      model.bones.map((bone) => skinOf[bone]),
-      "VEC4",
-    ),
-    WEIGHTS_0: vertices(model.weights, "VEC4"),
+    JOINTS_0: vertices(joints, "VEC4"),
+    WEIGHTS_0: vertices(weights, "VEC4"),
   };
-  const primitives = [model.body, model.face].map((triangles, material) => ({
-    attributes,
-    material,
-    indices: asset.addAccessor(triangles, "SCALAR", { target: "indices" }),
-  }));
-  return { name: "figure", primitives };
+}
+
+/** Return the joints of the vertices and their weights; a vertex has each joint once (glTF 2.0, 3.7.3.3). */
+function mergeWeights(model: PuppetModel, skinOf: readonly number[]) {
+  const joints = model.bones.map((bone) => skinOf[bone]);
+  const weights = model.weights.slice();
+  for (let at = 0; at < joints.length; at++) {
+    const first = joints.indexOf(joints[at], at - (at % 4));
+    if (first < at) {
+      weights[first] += weights[at];
+      weights[at] = 0;
+    }
+    if (weights[at] === 0) joints[at] = 0;
+  }
+  return { joints, weights };
 }
 
 /** Add the matrices from the mesh to the frames of the bones at rest. Return the accessor's index. */

@@ -26,7 +26,8 @@ export interface GltfNode {
   skin?: number;
 }
 
-type ChannelPath = "translation" | "rotation";
+/** Properties that channels change, and the types of their values. */
+const CHANNEL_TYPES = { translation: "VEC3", rotation: "VEC4", weights: "SCALAR" } as const;
 
 export class GltfBuilder {
   /** Further properties of the asset: meshes, materials, skins, extensions. */
@@ -79,11 +80,41 @@ export class GltfBuilder {
     return this.#accessors.length - 1;
   }
 
-  /** Add a channel that moves a node linearly between `values` at the times of an accessor. */
-  addChannel(node: number, path: ChannelPath, times: number, values: Float32Array<ArrayBuffer>): void {
+  /**
+   * Add an accessor of vectors (3) with minimum and maximum, of which only those that are not zero are stored. Return
+   * its index.
+   */
+  addSparseAccessor(values: Float32Array<ArrayBuffer>): number {
+    const count = values.length / 3;
+    const vectors = Array.from({ length: count }, (_, at) => values.subarray(at * 3, at * 3 + 3));
+    const used = vectors.flatMap((vector, at) => (vector.some((value) => value !== 0) ? [at] : []));
+    const bound = (combine: (...numbers: number[]) => number) =>
+      [0, 1, 2].map((axis) =>
+        used.reduce((found, at) => combine(found, vectors[at][axis]), used.length < count ? 0 : vectors[0][axis]),
+      );
+    const stored = new Float32Array(used.flatMap((at) => [...vectors[at]]));
+    const sparse = () => ({
+      count: used.length,
+      indices: { bufferView: this.addBufferView(Uint16Array.from(used)), componentType: 5123 },
+      values: { bufferView: this.addBufferView(stored) },
+    });
+    this.#accessors.push({
+      componentType: 5126,
+      count,
+      type: "VEC3",
+      min: bound(Math.min),
+      max: bound(Math.max),
+      // An accessor without data is zero.
+      ...(used.length > 0 ? { sparse: sparse() } : {}),
+    });
+    return this.#accessors.length - 1;
+  }
+
+  /** Add a channel that changes a node linearly between `values` at the times of an accessor. */
+  addChannel(node: number, path: keyof typeof CHANNEL_TYPES, times: number, values: Float32Array<ArrayBuffer>): void {
     this.#samplers.push({
       input: times,
-      output: this.addAccessor(values, path === "rotation" ? "VEC4" : "VEC3"),
+      output: this.addAccessor(values, CHANNEL_TYPES[path]),
       interpolation: "LINEAR",
     });
     this.#channels.push({ sampler: this.#samplers.length - 1, target: { node, path } });

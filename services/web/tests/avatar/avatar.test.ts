@@ -2,6 +2,7 @@ import { Group, type Object3D, Quaternion, Vector3 } from "three";
 import { beforeAll, describe, expect, test } from "vitest";
 import { Avatar } from "../../src/avatar/avatar";
 import { AvatarModel } from "../../src/avatar/model";
+import type { StagedPose } from "../../src/motion/extension";
 import { type Figure, JOINTS, type Pose, restPose } from "../../src/motion/skeleton";
 import { handlePosition } from "../../src/stage/puppet/performer";
 import { SOLE_HEIGHT_M, jointPosition as standing } from "../../src/stage/puppet/standard-figure";
@@ -88,6 +89,33 @@ test("is as high as its head reaches, but not as an antenna", async () => {
 });
 
 describe.each(Object.entries(FILES))("%s", (_, options) => {
+  test("keeps a planted foot in place, whose direction stays, while the body moves", async () => {
+    const model = await read(options);
+    const avatar = new Avatar(model, createOtherFigure());
+    const [, point] = model.rest.solePoints.get("leftFoot") as readonly Vector3[];
+    const foot = model.nodes.get("leftFoot") as Object3D;
+    const show = (frame: number, planted: number) => {
+      const pose: StagedPose = poseAt(0.004 * frame);
+      pose.contacts = { planted, controlled: 0, clock: 1e15 + 16_667 * frame };
+      avatar.apply(pose, 1 / 60);
+      return point.clone().applyMatrix4(foot.matrixWorld);
+    };
+    const place = show(0, 1);
+    const direction = foot.getWorldQuaternion(new Quaternion());
+    for (let frame = 1; frame < 25; frame++) {
+      const held = show(frame, 1);
+      expect(Math.hypot(held.x - place.x, held.z - place.z)).toBeLessThan(1e-6);
+    }
+    const plain = new Avatar(await read(options), createOtherFigure());
+    plain.apply(poseAt(0.004 * 24), 1 / 60);
+    const turned = foot.getWorldQuaternion(new Quaternion());
+    show(39, 0);
+    avatar.apply(poseAt(0.004 * 24), 1 / 60);
+    expect(turned.angleTo(foot.getWorldQuaternion(new Quaternion()))).toBeLessThan(1e-6);
+    expect(turned.angleTo(direction)).toBeGreaterThan(1e-4);
+    expect(avatar.group.position.distanceTo(plain.group.position)).toBeLessThan(1e-9);
+  });
+
   let model: AvatarModel;
   const figure = createOtherFigure();
   beforeAll(async () => {

@@ -4,7 +4,7 @@ import { BoneOrientations, DRIVEN_BONES } from "../../src/avatar/bone-orientatio
 import { createExtendedPose, type ExtendedPose, extendPose } from "../../src/motion/extension";
 import { BONES, createHumanoidPose, toHumanoid } from "../../src/motion/humanoid";
 import { createWorldTransforms, type Figure, type WorldTransforms, worldTransforms } from "../../src/motion/skeleton";
-import { extensionVectors, goldenExtensionTrack } from "../golden-extensions";
+import { extensionVectors, goldenBody } from "../golden-extensions";
 
 const golden = extensionVectors();
 const FULL = () => true;
@@ -14,7 +14,7 @@ function posed(vector: (typeof golden.poses)[number]) {
   const figure: Figure = { offsets: Float64Array.from(vector.offsets), tips: new Float64Array(54) };
   const pose = { root: Float64Array.from(vector.root), rotations: Float64Array.from(vector.rotations) };
   const world = worldTransforms(figure, pose, createWorldTransforms());
-  const { extension } = goldenExtensionTrack(golden.tracks[vector.track]);
+  const extension = goldenBody(golden.tracks[vector.track]);
   const extended = extendPose(figure, world, Float64Array.from(vector.values), createExtendedPose(extension));
   return { figure, pose, world, extended };
 }

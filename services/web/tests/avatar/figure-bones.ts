@@ -1,5 +1,6 @@
 /** Bones of the figures in test files: places in the T-pose, angles of other rest poses, and names. */
 import { Vector3 } from "three";
+import { VRM_NAMES } from "../../src/motion/hands";
 
 /** Rest pose and proportions of a figure. */
 export interface FigureShape {
@@ -14,6 +15,10 @@ export interface FigureShape {
   without?: readonly string[];
   /** Add a tail with spring bones (VRM 1). */
   tail?: boolean;
+  /** Joints of each finger; without it, the hand has one bone, the first of the middle finger. */
+  fingers?: number;
+  /** Angle between one bone of a finger at rest and the next, in degrees. */
+  curl?: number;
 }
 
 export interface Bone {
@@ -34,6 +39,7 @@ export function bonesOf({
   headHeight = 0.2,
   without = [],
   tail = false,
+  fingers = 0,
 }: FigureShape): Bone[] {
   const bones: Bone[] = [
     { name: "hips", parent: null, offset: at(0, 0.06 + 0.86 * legLength, 0), end: at(0, 0.1, 0) },
@@ -73,6 +79,20 @@ export function bonesOf({
       { name: `${side}Toes`, parent: `${side}Foot`, offset: at(0, -0.05 * legLength, 0.13), end: at(0, 0, 0.07) },
     );
   }
+  for (const [chain, names] of fingers > 0 ? VRM_NAMES.entries() : []) {
+    const x = chain < 5 ? 1 : -1;
+    const finger = chain % 5;
+    names.slice(0, fingers).forEach((name, place) => {
+      const length = finger === 0 ? 0.03 : 0.035;
+      const end = finger === 0 ? at(Math.SQRT1_2 * length * x, 0, Math.SQRT1_2 * length) : at(length * x, 0, 0);
+      const base = finger === 0 ? at(0.02 * x, 0, 0.02) : at(0.08 * x, 0, 0.04 - 0.02 * finger);
+      const parent = place === 0 ? (x > 0 ? "leftHand" : "rightHand") : names[place - 1];
+      const existing = bones.find((bone) => bone.name === name);
+      const bone = { name, parent, offset: place === 0 ? base : end, end };
+      if (existing) Object.assign(existing, bone);
+      else bones.push(bone);
+    });
+  }
   if (tail)
     bones.push(
       { name: "tail", parent: "hips", offset: at(0, 0, -0.08), end: at(0, 0, -0.3) },
@@ -84,8 +104,13 @@ export function bonesOf({
 }
 
 /** Return the rotation of a bone from the T-pose about z, in radians. */
-export function bend(name: string, { arms = 0, legs = 0 }: FigureShape): number {
+export function bend(name: string, { arms = 0, legs = 0, curl = 0, fingers = 0 }: FigureShape): number {
   const sign = name.startsWith("left") ? 1 : -1;
+  const chain = fingers > 0 ? VRM_NAMES.findIndex((names) => names.includes(name)) : -1;
+  if (chain >= 0) {
+    const place = VRM_NAMES[chain].indexOf(name);
+    return (-sign * (arms + (chain % 5 === 0 ? 0 : curl * (place + 1))) * Math.PI) / 180;
+  }
   if (/UpperArm|LowerArm|Hand|MiddleProximal/.test(name)) return (-sign * arms * Math.PI) / 180;
   return /UpperLeg|LowerLeg/.test(name) ? (sign * legs * Math.PI) / 180 : 0;
 }
@@ -109,6 +134,12 @@ export function mixamoName(bone: string): string {
     Foot: "Foot",
     Toes: "ToeBase",
   };
+  const finger = VRM_NAMES.flat().includes(bone) && bone !== `${bone.slice(0, side.length)}MiddleProximal`;
+  if (finger) {
+    const chain = VRM_NAMES.findIndex((names) => names.includes(bone));
+    const named = ["Thumb", "Index", "Middle", "Ring", "Pinky"][chain % 5];
+    return `mixamorig:${side}Hand${named}${VRM_NAMES[chain].indexOf(bone) + 1}`;
+  }
   const word = words[bone.slice(side.length)];
   if (!word) throw new Error(`Mixamo has no ${bone}`);
   return `mixamorig:${side}${word}`;

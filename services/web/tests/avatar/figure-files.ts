@@ -165,7 +165,7 @@ export function createFigureFile(options: FigureOptions = {}): Uint8Array<ArrayB
       VRM: {
         specVersion: "0.0",
         meta: { title: options.title ?? "Old boxes" },
-        humanoid: { humanBones: humanBones.map((bone) => ({ bone, node: index(bone) })) },
+        humanoid: { humanBones: humanBones.map((bone) => ({ bone: oldThumbName(bone), node: index(bone) })) },
         materialProperties: dressed ? [OLD_CARTOON] : [],
       },
     };
@@ -223,4 +223,9 @@ function addMaterials(json: Record<string, unknown>, vrm: 0 | 1 | undefined): vo
         outlineColorFactor: [0.1, 0.1, 0.1],
       },
     };
+}
+
+/** Return VRM 0's name of a bone. */
+function oldThumbName(bone: string): string {
+  return bone.replace("ThumbProximal", "ThumbIntermediate").replace("ThumbMetacarpal", "ThumbProximal");
 }

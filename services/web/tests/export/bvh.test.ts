@@ -5,7 +5,16 @@ import { expect, test } from "vitest";
 import { writeBvh } from "../../src/export/bvh";
 import type { SampledMotion } from "../../src/export/sampled-motion";
 import { createOtherFigure } from "../stage/puppet/figures";
-import { goldenMotion, joinParts, jointPositions, maxJointError, runToCompletion, turningMotion } from "./motions";
+import {
+  extendedMotion,
+  goldenMotion,
+  joinParts,
+  jointPositions,
+  maxJointError,
+  runToCompletion,
+  turningMotion,
+  withHands,
+} from "./motions";
 
 const BESIDE = { x: 1.3, z: -0.4, turn: 2.2 };
 const REPOSITORY = resolve(import.meta.dirname, "../../../..");
@@ -19,10 +28,25 @@ test.each([
   ["differently proportioned", turningMotion({ figure: createOtherFigure() })],
   ["golden", goldenMotion()],
   ["placed", goldenMotion(1, BESIDE)],
+  ["handed", withHands(goldenMotion(1, BESIDE))],
+  ["partly handed", withHands(turningMotion(), [2, 1, 0, 3, 0, 0, 0, 0, 0, 0])],
+  ["handed, extended", withHands({ ...extendedMotion(0), placement: BESIDE })],
 ])("three.js reads a %s motion unchanged", async (_, motion) => {
   const { skeleton, clip } = new BVHLoader().parse(await writtenText(motion));
   expect(skeleton.bones[0].name).toBe("humanoid_root");
   expect(maxJointError(motion, skeleton.bones[0], clip, 0.01)).toBeLessThan(1e-4);
+});
+
+test("fingers end in sites, a wrist only without fingers", async () => {
+  const motion = withHands(turningMotion(), [3, 3, 3, 3, 3, 0, 0, 0, 0, 0]);
+  const { bones } = new BVHLoader().parse(await writtenText(motion)).skeleton;
+  const endOf = (name: string) => bones.find((bone) => bone.name === name)?.children.map((child) => child.name);
+  expect(endOf("r_wrist")).toEqual(["ENDSITE"]);
+  expect(endOf("l_carpal_distal_interphalangeal_2")).toEqual(["ENDSITE"]);
+  expect(endOf("l_wrist")).toEqual([
+    "l_carpometacarpal_1",
+    ...[2, 3, 4, 5].map((digit) => `l_metacarpophalangeal_${digit}`),
+  ]);
 });
 
 /** Parse BVH with the Python reader, and write the same motion with the Python writer. */

@@ -6,7 +6,16 @@ import type { SampledMotion } from "../../src/export/sampled-motion";
 import { JOINTS } from "../../src/motion/skeleton";
 import { createPuppetModel } from "../../src/stage/puppet/puppet-model";
 import { createOtherFigure, createStandardFigure } from "../stage/puppet/figures";
-import { goldenMotion, joinParts, jointPositions, maxJointError, runToCompletion, turningMotion } from "./motions";
+import {
+  extendedMotion,
+  goldenMotion,
+  joinParts,
+  jointPositions,
+  maxJointError,
+  runToCompletion,
+  turningMotion,
+  withHands,
+} from "./motions";
 
 /** Write these motions as GLB and read them with three.js; motions of one figure share a model. */
 async function read(...motions: SampledMotion[]) {
@@ -21,6 +30,9 @@ const ALONE: [string, SampledMotion][] = [
   ["differently proportioned", turningMotion({ figure: createOtherFigure() })],
   ["golden", goldenMotion()],
   ["placed", goldenMotion(1, { x: -2, z: 0.5, turn: 1 })],
+  ["handed", withHands(goldenMotion(1, { x: -2, z: 0.5, turn: 1 }))],
+  ["partly handed", withHands(turningMotion(), [2, 1, 0, 3, 0, 0, 0, 0, 0, 0])],
+  ["handed, extended", withHands(extendedMotion(0))],
 ];
 
 test.each(ALONE)("three.js reads a %s motion unchanged", async (_, motion) => {
@@ -55,6 +67,49 @@ test("the puppet's vertices move with their bones", async () => {
     body.getVertexPosition(vertex, at);
     expect(at.distanceTo(body.skeleton.bones[skinIndex.getX(vertex)].localToWorld(place.clone()))).toBeLessThan(1e-5);
   }
+});
+
+test.each([
+  ["", turningMotion()],
+  [" with an extension", extendedMotion(0)],
+])("fingers are bones of the skin and move no vertex%s", async (_, motion) => {
+  const [bare, handed] = await Promise.all([read(motion), read(withHands(motion))]);
+  const meshOf = ({ scene }: typeof bare) => {
+    let found: SkinnedMesh | null = null;
+    scene.traverse((one) => {
+      if (!found && "isSkinnedMesh" in one) found = one as SkinnedMesh;
+    });
+    return found as unknown as SkinnedMesh;
+  };
+  const meshes = [meshOf(bare), meshOf(handed)];
+  expect(meshes[1].skeleton.bones.length - meshes[0].skeleton.bones.length).toBe(30);
+  const places = meshes.map((mesh, at) => {
+    const { scene, animations } = [bare, handed][at];
+    maxJointError(at === 0 ? motion : withHands(motion), scene, animations[0]);
+    return Array.from({ length: 40 }, (_, vertex) => mesh.getVertexPosition(vertex * 53, new Vector3()));
+  });
+  for (const [vertex, place] of places[0].entries()) expect(place.distanceTo(places[1][vertex])).toBeLessThan(1e-5);
+});
+
+test.each([
+  ["", turningMotion()],
+  [" with an extension", extendedMotion(0)],
+])("a vertex has each joint once, and weights of sum 1%s", async (_, motion) => {
+  const { scene } = await read(motion);
+  scene.traverse((one) => {
+    if (!("isSkinnedMesh" in one)) return;
+    const { skinIndex, skinWeight } = (one as SkinnedMesh).geometry.attributes;
+    for (let vertex = 0; vertex < skinIndex.count; vertex++) {
+      const slots = [0, 1, 2, 3].map((slot) => [
+        skinIndex.getComponent(vertex, slot),
+        skinWeight.getComponent(vertex, slot),
+      ]);
+      const used = slots.filter(([, weight]) => weight > 0).map(([joint]) => joint);
+      expect(new Set(used).size).toBe(used.length);
+      expect(slots.reduce((sum, [, weight]) => sum + weight, 0)).toBeCloseTo(1, 5);
+      expect(slots.every(([joint, weight]) => weight > 0 || joint === 0)).toBe(true);
+    }
+  });
 });
 
 test("sleeves hang down when the arms point sideways", async () => {

@@ -3,13 +3,15 @@ import { type AnimationClip, AnimationMixer, type Object3D, Vector3 } from "thre
 import { expect } from "vitest";
 import { MotionTrack } from "../../src/codec/motion-track";
 import {
-  extensionValuesAt,
+  frameValuesAt,
   type IncrementalTask,
   poseAt,
   type SampledMotion,
   sampleMotion,
 } from "../../src/export/sampled-motion";
 import { createExtendedPose, extendPose } from "../../src/motion/extension";
+import { EXPRESSIONS } from "../../src/motion/face";
+import { chainJoints, HANIM_NAMES, poseHands } from "../../src/motion/hands";
 import { applyPlacement, type Placement, STAGE_CENTRE } from "../../src/motion/placement";
 import { fromRotationVector } from "../../src/motion/rotation";
 import {
@@ -21,9 +23,11 @@ import {
   worldTransforms,
 } from "../../src/motion/skeleton";
 import { MotionBlockStore } from "../../src/playout/block-store";
-import { extensionVectors, goldenExtensionTrack } from "../golden-extensions";
+import { faceOf } from "../avatar/face/faces";
+import { extensionVectors, goldenBody } from "../golden-extensions";
 import { type BlockVectors, goldenDescription } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";
+import { createHands } from "../motion/hand-poses";
 import { createStandardFigure } from "../stage/puppet/figures";
 
 /**
@@ -63,7 +67,7 @@ export function turningMotion({
 export function extendedMotion(track: number): SampledMotion {
   const golden = extensionVectors();
   const vector = golden.poses.find((pose) => pose.track === track) as (typeof golden.poses)[number];
-  const { extension } = goldenExtensionTrack(golden.tracks[track]);
+  const extension = goldenBody(golden.tracks[track]);
   const figure = { offsets: Float64Array.from(vector.offsets), tips: createStandardFigure().tips };
   const motion = turningMotion({ straight: true, figure });
   const size = extension.kinds.length * 3;
@@ -72,6 +76,48 @@ export function extendedMotion(track: number): SampledMotion {
     (_, at) => 0.15 * Math.sin(Math.floor(at / size) / 6 + (at % size)),
   );
   return { ...motion, extension: { extension, values } };
+}
+
+/** Return a motion with fingers of these numbers of joints, all of which move. */
+export function withHands(motion: SampledMotion, count: number | readonly number[] = 3): SampledMotion {
+  const hands = createHands(count);
+  const size = chainJoints(hands).length * 3;
+  const values = Float64Array.from(
+    { length: motion.frames * size },
+    (_, at) => 0.7 * Math.sin(Math.floor(at / size) / 5 + (at % size)),
+  );
+  return { ...motion, hands: { hands, values } };
+}
+
+/** Return a motion with a face that knows these expressions, whose weights rise and fall. */
+export function withFace(motion: SampledMotion, ...names: string[]): SampledMotion {
+  const { face } = faceOf(Object.fromEntries(names.map((name) => [name, 1])));
+  const weights = new Float64Array(motion.frames * EXPRESSIONS.length);
+  for (let frame = 0; frame < motion.frames; frame++)
+    names.forEach((name, at) => {
+      weights[frame * EXPRESSIONS.length + EXPRESSIONS.indexOf(name)] = 0.5 + 0.5 * Math.sin(frame / 4 + at);
+    });
+  return { ...motion, face: { face, weights } };
+}
+
+/** Return the world positions of the joints of the fingers in a frame, metres, by H-Anim name. */
+export function fingerPositions(motion: SampledMotion, frame: number): Map<string, Vector3> {
+  const { hands } = motion.hands as NonNullable<SampledMotion["hands"]>;
+  const joints = chainJoints(hands);
+  const pose = applyPlacement(poseAt(motion, frame, restPose()), motion.placement);
+  const world = worldTransforms(motion.figure, pose, createWorldTransforms());
+  const { extension, hands: values } = frameValuesAt(motion, frame);
+  const extended =
+    motion.extension && extension
+      ? extendPose(motion.figure, world, extension, createExtendedPose(motion.extension.extension))
+      : world;
+  const { positions } = poseHands({ hands, values: values as Float64Array }, extended, {
+    positions: new Float64Array(joints.length * 3),
+    orientations: new Float64Array(joints.length * 4),
+  });
+  return new Map(
+    joints.map(([chain, place], joint) => [HANIM_NAMES[chain][place], new Vector3().fromArray(positions, joint * 3)]),
+  );
 }
 
 /** Return a golden motion at the best bitrate level of each block, at a placement. */
@@ -111,7 +157,7 @@ export async function joinParts(parts: Uint8Array<ArrayBuffer>[]): Promise<Array
 export function jointPositions(motion: SampledMotion, frame: number): Float64Array {
   const pose = applyPlacement(poseAt(motion, frame, restPose()), motion.placement);
   const world = worldTransforms(motion.figure, pose, createWorldTransforms());
-  const values = extensionValuesAt(motion, frame);
+  const { extension: values } = frameValuesAt(motion, frame);
   if (!motion.extension || !values) return world.positions.slice();
   return extendPose(motion.figure, world, values, createExtendedPose(motion.extension.extension)).positions.slice();
 }
@@ -136,12 +182,18 @@ export function maxJointError(
     mixer.setTime(Math.min(frame / motion.fps, clip.duration - 1e-6));
     root.updateMatrixWorld(true);
     const places = jointPositions(motion, frame);
-    for (const name of JOINTS) {
+    // an extension has its own spine
+    for (const name of JOINTS.filter((one) => one !== "vl5" || !motion.extension)) {
       const joint = find(name);
       if (!joint) throw new Error(`The file has no joint ${name}.`);
       at.setFromMatrixPosition(joint.matrixWorld).multiplyScalar(unit);
       const k = JOINTS.indexOf(name) * 3;
       maxError = Math.max(maxError, Math.hypot(at.x - places[k], at.y - places[k + 1], at.z - places[k + 2]));
+    }
+    for (const [name, place] of motion.hands ? fingerPositions(motion, frame) : []) {
+      const joint = find(name);
+      if (!joint) throw new Error(`The file has no joint ${name}.`);
+      maxError = Math.max(maxError, at.setFromMatrixPosition(joint.matrixWorld).multiplyScalar(unit).distanceTo(place));
     }
   }
   return maxError;

@@ -1,8 +1,11 @@
 import { expect, test } from "vitest";
-import { poseAt, sampleMotion } from "../../src/export/sampled-motion";
+import { faceWeightsAt, frameValuesAt, poseAt, sampleMotion } from "../../src/export/sampled-motion";
+import { EXPRESSIONS, faceExpressions } from "../../src/motion/face";
 import { STAGE_CENTRE } from "../../src/motion/placement";
 import { restPose } from "../../src/motion/skeleton";
 import { MotionBlockStore } from "../../src/playout/block-store";
+import { ExtensionBlockStore } from "../../src/playout/extension-poses";
+import { goldenHandsFaceTrack, handsFaceVectors } from "../golden-hands-face";
 import { type BlockVectors, goldenTrack } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 import { goldenMotion, goldenStore, runToCompletion } from "./motions";
@@ -42,4 +45,31 @@ test("a motion with a missing block is not sampled", () => {
   expect(() => runToCompletion(sampleMotion(new MotionBlockStore(goldenTrack())))).toThrow(
     "the block of frame 0 is not loaded",
   );
+});
+
+test("fingers and face are sampled from their stores at every frame", () => {
+  const golden = handsFaceVectors();
+  const storeOf = (track: number) => {
+    const extension = new ExtensionBlockStore(goldenHandsFaceTrack(golden.tracks[track]));
+    const blocks = golden.valid.filter((vector) => vector.track === track);
+    blocks.slice(0, blocks.length / 2).forEach(({ block }, index) => {
+      extension.put(index, 0, decodeBase64(block));
+    });
+    return extension;
+  };
+  const extensions = { fingers: storeOf(0), face: storeOf(2) };
+  const store = goldenStore();
+  const motion = runToCompletion(sampleMotion(store, 45, extensions));
+  const values = new Float64Array(90);
+  extensions.fingers.valuesAt((44 * 1e6) / store.track.fps, false, store.track.durationUs, values);
+  expect(values.some((value) => value !== 0)).toBe(true);
+  expect(frameValuesAt(motion, 44)).toEqual({ extension: null, hands: values });
+  const axes = new Float64Array(extensions.face.track.layout.count * 3);
+  extensions.face.valuesAt(0, false, store.track.durationUs, axes);
+  const weights = new Float64Array(EXPRESSIONS.length);
+  const { content } = extensions.face.track;
+  if (content.part === "face") faceExpressions(content.face, axes, weights);
+  expect(weights.some((weight) => weight > 0.1)).toBe(true);
+  expect(faceWeightsAt(motion, 0)).toEqual(weights);
+  expect(faceWeightsAt(goldenMotion(), 0)).toBe(null);
 });

@@ -1,13 +1,23 @@
 import { type VRM1Meta, VRMCore, type VRMHumanBones, VRMHumanoid } from "@pixiv/three-vrm";
 import { createVRMAnimationClip, type VRMAnimation, VRMAnimationLoaderPlugin } from "@pixiv/three-vrm-animation";
-import { AnimationMixer, Group, Object3D, Quaternion, Vector3 } from "three";
+import { AnimationMixer, Euler, Group, Object3D, Quaternion, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { describe, expect, test } from "vitest";
-import { poseAt, type SampledMotion } from "../../src/export/sampled-motion";
+import { faceWeightsAt, frameValuesAt, poseAt, type SampledMotion } from "../../src/export/sampled-motion";
 import { writeVrma } from "../../src/export/vrma";
+import { expressionIndex } from "../../src/motion/face";
+import { chainJoints, VRM_NAMES } from "../../src/motion/hands";
 import { BONE_PARENTS, BONES, tPoseFigure } from "../../src/motion/humanoid";
 import { createWorldTransforms, restPose, worldTransforms } from "../../src/motion/skeleton";
-import { goldenMotion, joinParts, runToCompletion, turningMotion } from "./motions";
+import {
+  extendedMotion,
+  goldenMotion,
+  joinParts,
+  runToCompletion,
+  turningMotion,
+  withFace,
+  withHands,
+} from "./motions";
 
 async function read(motion: SampledMotion): Promise<VRMAnimation> {
   const loader = new GLTFLoader();
@@ -100,4 +110,48 @@ test("with a straight sacroiliac nothing is shifted", async () => {
   const figureWorld = worldTransforms(motion.figure, poseAt(motion, 20, restPose()), createWorldTransforms());
   const hand = new Vector3().setFromMatrixPosition((vrm.humanoid.getRawBoneNode("leftHand") as Object3D).matrixWorld);
   expect(hand.distanceTo(new Vector3().fromArray(figureWorld.positions, 14 * 3))).toBeLessThan(1e-4);
+});
+
+test.each([
+  ["", withHands(turningMotion())],
+  [" of an extended figure", withHands(extendedMotion(0), [3, 3, 0, 2, 0, 1, 3, 3, 3, 3])],
+])("fingers%s turn from the T-pose in the frames of the bones before them", async (_, motion) => {
+  const { humanoidTracks } = await read(motion);
+  const { hands } = motion.hands as NonNullable<SampledMotion["hands"]>;
+  const expected = new Quaternion();
+  const read20 = new Quaternion();
+  chainJoints(hands).forEach(([chain, place], joint) => {
+    const track = humanoidTracks.rotation.get(VRM_NAMES[chain][place] as "leftThumbProximal");
+    const [x, y, z] = (frameValuesAt(motion, 20).hands as Float64Array).subarray(joint * 3);
+    // The T-pose raises the arm sideways: down becomes outwards.
+    const raised = new Vector3(x, y, z).applyAxisAngle(new Vector3(0, 0, 1), (chain < 5 ? 1 : -1) * (Math.PI / 2));
+    expected.setFromAxisAngle(raised.clone().normalize(), raised.length());
+    expect(read20.fromArray(track?.values ?? [], 20 * 4).angleTo(expected)).toBeLessThan(1e-3);
+  });
+});
+
+test("a face is written as presets and custom expressions", async () => {
+  const motion = withFace(turningMotion(), "jawOpen", "mouthSmileLeft", "mouthSmileRight", "happy", "aa");
+  const { expressionTracks, lookAtTrack } = await read(motion);
+  expect([...expressionTracks.preset.keys()].sort()).toEqual(["aa", "happy"]);
+  expect([...expressionTracks.custom.keys()].sort()).toEqual(["jawOpen", "mouthSmileLeft", "mouthSmileRight"]);
+  expect(lookAtTrack).toBe(null);
+  for (const [name, { values }] of [...expressionTracks.preset, ...expressionTracks.custom])
+    for (let frame = 0; frame < motion.frames; frame++)
+      expect(values[frame]).toBeCloseTo((faceWeightsAt(motion, frame) as Float64Array)[expressionIndex(name)], 6);
+});
+
+test("the gaze is written as a rotation, not as expressions", async () => {
+  const { expressionTracks, lookAtTrack } = await read(withFace(turningMotion(), "gazeYaw", "gazePitch", "lookLeft"));
+  expect([...expressionTracks.preset.keys(), ...expressionTracks.custom.keys()]).toEqual([]);
+  const euler = new Euler().setFromQuaternion(new Quaternion().fromArray(lookAtTrack?.values ?? []), "YXZ");
+  expect(euler.y).toBeCloseTo(0.5, 5);
+  // Positive about x is down.
+  expect(euler.x).toBeCloseTo(-0.5 - 0.5 * Math.sin(1), 5);
+});
+
+test("blend shapes of the eyes are written as such", async () => {
+  const { expressionTracks, lookAtTrack } = await read(withFace(turningMotion(), "eyeLookUpLeft", "eyeLookUpRight"));
+  expect([...expressionTracks.custom.keys()]).toContain("eyeLookUpLeft");
+  expect(lookAtTrack).toBe(null);
 });

@@ -1,7 +1,7 @@
 /**
  * Naming conventions of joints, from `proto/joint_names.json`, which the server's readers of motions use too
- * (`bunraku.motion.naming.naming_profile`). Patterns are words without a side; `|` separates alternatives, the first choice
- * first.
+ * (`bunraku.motion.naming.naming_profile`). Patterns are words without a side; `|` separates alternatives, the first
+ * choice first.
  */
 import document from "../../../../../proto/joint_names.json";
 
