@@ -10,7 +10,7 @@ import { limbNumber } from "../wire/limbs";
 import { AudienceCamera, type Framing } from "./camera/audience-camera";
 import { CameraRecorder } from "./camera/camera-recorder";
 import { FollowRig } from "./camera/follow-rig";
-import { type ScreenBox, unionOf, type WorldExtent } from "./camera/screen-box";
+import type { ScreenBox, WorldExtent } from "./camera/screen-box";
 import { type ScreenPosition, ScreenProjection } from "./camera/screen-projection";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
@@ -103,6 +103,11 @@ export class Stage {
   /** True if the canvas shows the state of the last call of `draw`; false while an earlier frame is still drawn. */
   get isUpToDate(): boolean {
     return this.#isUpToDate;
+  }
+
+  /** True if the last call of `draw` had to wait for the frame before, and the next one would have to. */
+  get isLate(): boolean {
+    return !this.#isUpToDate && this.#frameRenderer.isPending;
   }
 
   /** Performers in the order of the motion's tracks. */
@@ -208,7 +213,7 @@ export class Stage {
    * Advance to the poses of the performers (null: none yet) and draw if the last frame is complete. `states` are the
    * strings by limb number, `interval` the seconds since the last call, `motionCamera` the seven numbers of the
    * motion's camera (null if there is none), `lights` those of the motion, and `clock` the clock time of the poses in
-   * microseconds, which the recorded camera refers to.
+   * microseconds, which the recorded camera and blinks refer to.
    */
   draw(
     poses: readonly (StagedPose | null)[],
@@ -220,7 +225,7 @@ export class Stage {
   ): void {
     const { audience, rig } = this;
     const seconds = Math.min(interval, MAX_STEP_S);
-    this.#performerGroup.apply(poses, this.#reducedMotion ? 0 : seconds);
+    this.#performerGroup.apply(poses, this.#reducedMotion ? 0 : seconds, clock);
     const { visiblePerformers } = this.#performerGroup;
     const hasPose = poses.some((pose) => pose !== null) && visiblePerformers.length > 0;
     if (hasPose) {
@@ -256,7 +261,8 @@ export class Stage {
     if (this.#firstFrame !== "submitted") this.#addScenery();
     if (this.#frameRenderer.quality !== this.#appliedQuality) this.#applyQuality();
     this.#scenery.prepare(this.renderer);
-    this.#frameRenderer.draw(this.scene, audience.camera, hasPose ? this.#edgeBox : null);
+    this.#performerGroup.prepare(this.renderer, this.scene, audience.camera, this.#look);
+    this.#frameRenderer.draw(this.scene, audience.camera, hasPose ? this.#edgeBoxes : null);
     this.#isUpToDate = true;
     this.#drawnHandles = this.#performerGroup.handles.map((at) => at && this.toScreen(at));
   }
@@ -270,10 +276,11 @@ export class Stage {
   }
 
   /** Return the stage with its strings as PNG, in the best quality, whatever this machine normally draws. */
-  takePicture(): Promise<Blob> {
+  async takePicture(): Promise<Blob> {
+    const pictures = await this.#frameRenderer.loadPictures();
     this.#applyQuality(BEST_QUALITY);
     try {
-      return this.#frameRenderer.takePicture(this.scene, this.audience.camera, this.#look);
+      return this.#frameRenderer.takePicture(pictures, this.scene, this.audience.camera, this.#look);
     } finally {
       this.#applyQuality();
     }
@@ -328,12 +335,12 @@ export class Stage {
     return positions.sort((a, b) => a.distanceToSquared(eye) - b.distanceToSquared(eye))[0] ?? null;
   }
 
-  /** Box around all performers and control bars in the picture, in CSS pixels. */
-  get #edgeBox(): ScreenBox {
+  /** Boxes around all performers and control bars in the picture, in CSS pixels. */
+  get #edgeBoxes(): ScreenBox[] {
     const bars = this.performers.flatMap((_, performer) =>
       LIMBS.map((_, limb) => this.barBox(limbNumber(performer, limb))).filter((box) => box !== null),
     );
-    return unionOf([...this.#performerGroup.boxes(this.#projection), ...bars]);
+    return [...this.#performerGroup.boxes(this.#projection), ...bars];
   }
 
   #addScenery(): void {
@@ -397,6 +404,7 @@ export class Stage {
   #onContextRestored(): void {
     this.#updateEnvironment();
     this.#scenery.invalidate();
+    this.#performerGroup.invalidate();
     this.#frameRenderer.reset();
   }
 

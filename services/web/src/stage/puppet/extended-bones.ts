@@ -2,10 +2,8 @@
 import { type Bone, Quaternion, Vector3 } from "three";
 import { type BodyExtension, END_JOINTS, type ExtendedPose, type JointKind } from "../../motion/extension";
 import { type Figure, JOINTS } from "../../motion/skeleton";
+import { TRUNK_BONES } from "./bones";
 import { restPositions } from "./figure-fit";
-
-/** Bones of the puppet's trunk beside those of the figure; without an extension they follow vl5. */
-export const TRUNK_BONES: readonly string[] = ["chest", "neck", "l_clavicle", "r_clavicle"];
 
 const VL5 = JOINTS.indexOf("vl5");
 /** Joints whose bones an extension moves, parents before children. */

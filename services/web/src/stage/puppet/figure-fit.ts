@@ -6,6 +6,7 @@
 import { Matrix3, Matrix4, Quaternion, Vector3 } from "three";
 import { type Figure, JOINTS, PARENTS } from "../../motion/skeleton";
 import type { FitVertex } from "./geometry-builder";
+import { FINGER_BONES, fingerJoints, SEGMENTS, wristOf } from "./hand/finger-joints";
 import { CROWN, HEAD_CENTRE, jointPosition, LEFT_FINGER_TIP, SIDES, SOLE_HEIGHT_M } from "./standard-figure";
 
 /** Return the rest positions of a figure's joints by name, in metres; the root is at the figure's offset. */
@@ -93,6 +94,7 @@ export function fitToFigure(figure: Figure): FitVertex {
     maps.set(`${side}_ankle`, transformAbout(ankle, foot, ankleAt));
     maps.set(`${side}_midtarsal`, transformAbout(midtarsal, new Matrix4().makeScale(scale, scale, scale), midtarsalAt));
   }
+  for (const bone of FINGER_BONES) maps.set(bone, maps.get(wristOf(bone)) as Matrix4);
 
   const crown = positionOf(rest, "skullbase").clone().add(tip("skullbase"));
   const lean = crown.clone().sub(positionOf(rest, "skullbase")).setX(0);
@@ -135,6 +137,18 @@ export function fitToFigure(figure: Figure): FitVertex {
     position.copy(sum);
     normal.copy(sumNormal.normalize());
   };
+}
+
+/** Return the joints and the tip of each finger on a figure at rest. */
+export function fitFingers(figure: Figure): Vector3[][] {
+  const fit = fitToFigure(figure);
+  const normal = new Vector3(0, 1, 0);
+  return fingerJoints().map((joints, chain) =>
+    joints.map((at) => {
+      fit(at, normal, [[FINGER_BONES[chain * SEGMENTS], 1]]);
+      return at;
+    }),
+  );
 }
 
 function positionOf(rest: ReadonlyMap<string, Vector3>, name: string): Vector3 {

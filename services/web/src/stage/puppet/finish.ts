@@ -3,6 +3,13 @@
 /** Pattern that the shader adds to the colour. */
 export const PATTERN = { plain: 0, face: 1, asanoha: 2, weave: 3, stripe: 4 } as const;
 
+/**
+ * Parts of the mesh with a material of their own in software rendering, by its index. A fragment takes the time of all
+ * patterns that it could have: that of the face, the longest one, is left to the triangles of the face.
+ */
+export const MATERIAL_PARTS = ["faceless", "face"] as const;
+export type MaterialPart = (typeof MATERIAL_PARTS)[number];
+
 export interface Finish {
   /** sRGB hex. */
   colour: string;

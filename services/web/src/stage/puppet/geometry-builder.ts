@@ -1,6 +1,6 @@
 /** Builder that joins the puppet's parts into one skinned geometry. */
 import { BufferGeometry, Color, Float32BufferAttribute, Uint16BufferAttribute, Vector3 } from "three";
-import { type Finish, PATTERN } from "./finish";
+import { type Finish, MATERIAL_PARTS, PATTERN } from "./finish";
 import { HEAD_CENTRE } from "./standard-figure";
 import type { Detail, Surface, SurfaceMesh } from "./surface";
 
@@ -11,7 +11,7 @@ export type VertexWeights = (at: Vector3) => readonly (readonly [bone: string, w
 export type FitVertex = (position: Vector3, normal: Vector3, weights: readonly (readonly [string, number])[]) => void;
 
 /** Size of the planar projection of the face paint in metres, and the enlargement of the head about the chin. */
-const FACE_WINDOW_M = [0.2, 0.26] as const;
+export const FACE_WINDOW_M = [0.2, 0.26] as const;
 const HEAD_SCALE = 1.07;
 const CHIN_OFFSET_M = 0.11;
 
@@ -26,7 +26,8 @@ export class GeometryBuilder {
   readonly #patterns: number[] = [];
   readonly #skinIndices: number[] = [];
   readonly #skinWeights: number[] = [];
-  readonly #indices: number[] = [];
+  /** Triangles by the index of their material in software rendering. */
+  readonly #indices: readonly number[][] = MATERIAL_PARTS.map(() => []);
 
   constructor(bones: readonly string[], fit: FitVertex, detail: Detail) {
     this.#bones = new Map(bones.map((name, index) => [name, index]));
@@ -70,12 +71,13 @@ export class GeometryBuilder {
         this.#skinWeights.push(bone ? bone[1] : 0);
       }
     }
-    for (const index of mesh.indices) this.#indices.push(index + first);
+    const part = MATERIAL_PARTS.indexOf(pattern === PATTERN.face ? "face" : "faceless");
+    for (const index of mesh.indices) this.#indices[part].push(index + first);
   }
 
   /**
    * Return the geometry of all parts, with attributes `finish` (roughness, metalness, clearcoat, wood) and `pattern`
-   * (u, v, kind).
+   * (u, v, kind). Its groups are those of `MATERIAL_PARTS`.
    */
   build(): BufferGeometry {
     const geometry = new BufferGeometry();
@@ -86,7 +88,12 @@ export class GeometryBuilder {
     geometry.setAttribute("pattern", new Float32BufferAttribute(this.#patterns, 3));
     geometry.setAttribute("skinIndex", new Uint16BufferAttribute(this.#skinIndices, 4));
     geometry.setAttribute("skinWeight", new Float32BufferAttribute(this.#skinWeights, 4));
-    geometry.setIndex(this.#indices);
+    geometry.setIndex(this.#indices.flat());
+    let start = 0;
+    this.#indices.forEach(({ length }, part) => {
+      geometry.addGroup(start, length, part);
+      start += length;
+    });
     return geometry;
   }
 

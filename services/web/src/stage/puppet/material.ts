@@ -1,34 +1,55 @@
 /** The puppet's material: three.js's physical shading, with finish, pattern and wood from vertex attributes. */
-import { BackSide, type IUniform, MeshPhysicalMaterial, ShaderMaterial, type Texture } from "three";
+import { BackSide, type IUniform, MeshPhysicalMaterial, type Texture } from "three";
 import { NOISE_GLSL } from "../scenery/noise";
-import { createDistantLights, LIGHT_COUNT } from "./distant-lights";
+import { FACE_PAINT_GLSL } from "./face/face-paint";
 
 const VERTEX_HEADER_GLSL = /* glsl */ `
 attribute vec4 finish; attribute vec3 pattern;
 varying vec4 vFinish; varying vec3 vPattern; varying vec3 vRest; varying float vSeed, vFront;
 `;
-const FRAGMENT_HEADER_GLSL = /* glsl */ `
-varying vec4 vFinish; varying vec3 vPattern; varying vec3 vRest; varying float vSeed, vFront;
+export const FRAGMENT_HEADER_GLSL = /* glsl */ `
+varying vec3 vPattern;
+#ifdef PLAIN
+varying vec4 vSolid;
+#define vRest vSolid.xyz
+#define vSeed 0.
+#define vFront vSolid.w
+#define vFinish vec4(0., 0., 0., vPattern.z < .5 ? vSolid.w : 0.)
+#else
+varying vec4 vFinish; varying vec3 vRest; varying float vSeed, vFront;
+#endif
 uniform sampler2D facePaint; uniform sampler2D hempLeaf;
 ${NOISE_GLSL}
+#ifndef FACELESS
+${FACE_PAINT_GLSL}
+#endif
 `;
 
-/** Growth rings, fibres and pores from the position in the rest pose; `vSeed` gives each bone a different timber. */
+/** Offset of the timber from one bone to the next. */
+export const WOOD_SEED_GLSL = "vec3(.37, 1.3, .71)";
+
+/**
+ * Growth rings, fibres and pores from the position in the rest pose; `vSeed` gives each bone a different timber. With
+ * `PLAIN`, rings alone.
+ */
 const WOOD_GLSL = /* glsl */ `
-#ifndef PLAIN
 if (vFinish.w > 0.) {
-  vec3 q = vRest + vSeed * vec3(.37, 1.3, .71);
-  float warp = 1.6 * noise3(q * vec3(7., 1.6, 7.)) + .35 * noise3(q * vec3(22., 3., 22.));
+  vec3 q = vRest + vSeed * ${WOOD_SEED_GLSL};
+  float warp = 1.6 * noise3(q * vec3(7., 1.6, 7.)), fibre = .5, pore = 0.;
+#ifndef PLAIN
+  warp += .35 * noise3(q * vec3(22., 3., 22.));
+  fibre = noise3(q * vec3(520., 14., 520.));
+  pore = smoothstep(.74, .9, noise3(q * vec3(300., 9., 300.)));
+#else
+  warp += .175;
+#endif
   float ring = fract(.5 * (85. * length(q.xz - floor(q.xz * 2.) * .5 - vec2(.33, .18)) + 5. * warp));
   ring = smoothstep(0., .75, ring) * smoothstep(1., .86, ring);
-  float fibre = noise3(q * vec3(520., 14., 520.));
-  float pore = smoothstep(.74, .9, noise3(q * vec3(300., 9., 300.)));
   diffuseColor.rgb = mix(diffuseColor.rgb, diffuseColor.rgb * vec3(.62, .50, .40),
     vFinish.w * (.46 * ring + .25 * pore));
   diffuseColor.rgb *= 1. + vFinish.w * .14 * (fibre - .5);
   roughen = vFinish.w * (.10 * ring + .15 * pore);
 }
-#endif
 `;
 
 /**
@@ -43,9 +64,8 @@ if (skinWeight.x < 1.) {
 }
 `;
 
-/** Values of PATTERN in finish.ts: 1 face, 2 asanoha, 3 weave, 4 stripe. */
-const COLOUR_GLSL = /* glsl */ `
-#include <color_fragment>
+/** Values of PATTERN in finish.ts: 1 face, 2 asanoha, 3 weave, 4 stripe. With `FACELESS`, there is no face. */
+export const COLOUR_GLSL = /* glsl */ `
 float roughen = 0.;
 #ifdef PLAIN
 float thread = 1.;
@@ -60,57 +80,24 @@ if (vPattern.z > 3.5) {
 } else if (vPattern.z > 2.5) {
   diffuseColor.rgb *= .86 + .22 * smoothstep(.5, .62, 2. * abs(fract(vPattern.y * 46.) - .5));
 } else if (vPattern.z > 1.5) {
-  float line = texture2D(hempLeaf, vPattern.xy * 11.).r;
+  vec2 place = vPattern.xy * 11.;
+  #ifdef PLAIN
+  // With a level given, the texture is not read anisotropically, which takes several times as long.
+  vec2 texels = 512. * fwidth(place);
+  float line = textureLod(hempLeaf, place, .5 * log2(texels.x * texels.y + 1.) - .8).r;
+  #else
+  float line = texture2D(hempLeaf, place).r;
+  #endif
   diffuseColor.rgb = mix(diffuseColor.rgb, 2.2 * diffuseColor.rgb + vec3(.045, .055, .075), .62 * line);
   diffuseColor.rgb *= thread;
+#ifndef FACELESS
 } else if (vPattern.z > .5) {
   float front = smoothstep(.2, .5, vFront);
-  diffuseColor.rgb *= mix(vec3(1.), texture2D(facePaint, vPattern.xy).rgb, front);
+  diffuseColor.rgb *= mix(vec3(1.), paintFace(vPattern.xy), front);
+#endif
 }
 ${WOOD_GLSL}
 `;
-
-const SIMPLE_VERTEX_GLSL = /* glsl */ `
-#include <skinning_pars_vertex>
-${VERTEX_HEADER_GLSL}
-varying vec3 vColour, vNormal;
-void main() {
-  ${SKIN_MATRIX_GLSL}
-  vFinish = finish; vPattern = pattern; vRest = position; vSeed = skinIndex.x; vFront = normal.z;
-  gl_Position = projectionMatrix * modelViewMatrix * (skin * vec4(position, 1.));
-  vColour = color;
-  vNormal = normalMatrix * (mat3(skin) * normal);
-}`;
-const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
-${FRAGMENT_HEADER_GLSL}
-uniform vec3 lightDirections[${LIGHT_COUNT}], lightColours[${LIGHT_COUNT}];
-varying vec3 vColour, vNormal;
-void main() {
-  vec4 diffuseColor = vec4(vColour, 1.);
-  ${COLOUR_GLSL.replace("#include <color_fragment>", "")}
-  vec3 normal = normalize(vNormal);
-  // Light from everywhere, in place of that of the environment map.
-  vec3 irradiance = vec3(.22);
-  for (int i = 0; i < ${LIGHT_COUNT}; i++) irradiance += max(dot(normal, lightDirections[i]), 0.) * lightColours[i];
-  gl_FragColor = vec4(diffuseColor.rgb * irradiance, 1.);
-  #include <tonemapping_fragment>
-  #include <colorspace_fragment>
-}`;
-
-/** Create the material for software rendering: colours, patterns and light, without lacquer, grain or reflections. */
-export function createSimpleFigureMaterial(textures: PuppetTextures): ShaderMaterial {
-  return new ShaderMaterial({
-    uniforms: {
-      ...createDistantLights(),
-      facePaint: { value: textures.face },
-      hempLeaf: { value: textures.asanoha },
-    },
-    defines: { PLAIN: "" },
-    vertexColors: true,
-    vertexShader: SIMPLE_VERTEX_GLSL,
-    fragmentShader: SIMPLE_FRAGMENT_GLSL,
-  });
-}
 
 function patchVertexShader(shader: { vertexShader: string }): void {
   shader.vertexShader = shader.vertexShader
@@ -156,7 +143,7 @@ export function createFigureMaterial(textures: PuppetTextures, mirrorHeight?: IU
         "#include <common>",
         `#include <common>\n${FRAGMENT_HEADER_GLSL}${mirrorHeight ? "varying float vHeight;\n" : ""}`,
       )
-      .replace("#include <color_fragment>", COLOUR_GLSL)
+      .replace("#include <color_fragment>", `#include <color_fragment>\n${COLOUR_GLSL}`)
       .replace("#include <roughnessmap_fragment>", "float roughnessFactor = clamp(vFinish.x + roughen, .05, 1.);")
       .replace("#include <metalnessmap_fragment>", "float metalnessFactor = vFinish.y;")
       .replace(

@@ -1,10 +1,12 @@
 /** Performers on the stage: a puppet, or an avatar in its place, for each performer of the motion. */
-import { Group, type IUniform, Vector3 } from "three";
+import { type Camera, Group, type IUniform, type Scene, Vector3, type WebGLRenderer } from "three";
 import type { StagedPose } from "../../motion/extension";
 import { type Figure, LIMBS } from "../../motion/skeleton";
 import { STANDING_HEIGHT_M } from "../camera/audience-camera";
 import type { ScreenBox, WorldExtent } from "../camera/screen-box";
 import type { ScreenProjection } from "../camera/screen-projection";
+import type { Look } from "../scenery/look";
+import type { AutoBlink } from "./face/auto-blink";
 import type { Performer } from "./performer";
 import { Puppet } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
@@ -19,8 +21,14 @@ const OUTER_JOINTS = [
   ...["l", "r"].flatMap((side) => [`${side}_elbow`, `${side}_wrist`, `${side}_knee`, `${side}_ankle`]),
 ];
 const CLOTHES_EXTENT: WorldExtent = { across: 0.3, up: 0.3, down: 0.3 };
+/** The joint in the middle of a figure, and the extent of the trunk around it. */
+const MIDDLE_JOINT = "vl5";
+const TRUNK_EXTENT: WorldExtent = { across: 0.3, up: 0.5, down: 0.5 };
 /** Extent of a face on the standard figure. */
 const FACE_EXTENT: WorldExtent = { across: 0.1, up: 0.16, down: 0.14 };
+
+/** Time after the first pose after which performers blink, in seconds. */
+const BLINK_DELAY_S = 2;
 
 const at = new Vector3();
 
@@ -30,6 +38,9 @@ export class PerformerGroup {
   /** Index: performer. Null or missing: a puppet. */
   readonly #factories: (PerformerFactory | null)[] = [];
   #assets: PuppetAssets | null = null;
+  /** Null until they are loaded. */
+  #blinks: AutoBlink | null = null;
+  #movedS = 0;
   #showsReflection = false;
   #usesSimpleMaterials = false;
 
@@ -65,8 +76,12 @@ export class PerformerGroup {
     return this.visiblePerformers.flatMap(({ joint, scale, height }) => {
       // A large head reaches further up.
       const up = CLOTHES_EXTENT.up + Math.max(0, height / scale - STANDING_HEIGHT_M);
-      return OUTER_JOINTS.map((name) =>
-        projection.boxAt(at.setFromMatrixPosition(joint(name)), { ...CLOTHES_EXTENT, up }, scale),
+      return [MIDDLE_JOINT, ...OUTER_JOINTS].map((name) =>
+        projection.boxAt(
+          at.setFromMatrixPosition(joint(name)),
+          name === MIDDLE_JOINT ? TRUNK_EXTENT : { ...CLOTHES_EXTENT, up },
+          scale,
+        ),
       );
     });
   }
@@ -100,15 +115,16 @@ export class PerformerGroup {
   }
 
   /**
-   * Apply one pose per performer; without one it keeps its last. `seconds` advances the swing of loose parts; 0 stops
-   * it.
+   * Apply one pose per performer; without one it keeps its last. `seconds` advances the swing of loose parts and
+   * blinks; 0 stops them. `clock` is the clock time of the poses in microseconds; null without blinks.
    */
-  apply(poses: readonly (StagedPose | null)[], seconds: number): void {
+  apply(poses: readonly (StagedPose | null)[], seconds: number, clock: number | null = null): void {
+    if (!this.#blinks && clock !== null) this.#loadBlinks(seconds);
     this.#performers.forEach((performer, k) => {
       const pose = poses[k];
       if (!pose) return;
       performer.group.visible = true;
-      performer.apply(pose, seconds);
+      performer.apply(pose, seconds, this.#blinks?.update(k, pose, (clock ?? 0) / 1e6, clock === null ? 0 : seconds));
     });
   }
 
@@ -118,9 +134,31 @@ export class PerformerGroup {
     for (const performer of this.#performers) this.#applyQuality(performer);
   }
 
+  /** Draw what the next frame needs beforehand. World matrices are up to date. */
+  prepare(renderer: WebGLRenderer, scene: Scene, camera: Camera, look: Look): void {
+    for (const performer of this.visiblePerformers) performer.prepare?.(renderer, scene, camera, look);
+  }
+
+  /** Draw again what `prepare` has drawn: the graphics context was lost. */
+  invalidate(): void {
+    for (const performer of this.#performers) performer.invalidate?.();
+  }
+
   dispose(): void {
     for (const performer of this.#performers.splice(0)) performer.dispose();
     this.#assets?.dispose();
+  }
+
+  /** Load blinks some time after the first frame. */
+  #loadBlinks(seconds: number): void {
+    const before = this.#movedS;
+    this.#movedS += seconds;
+    // Without them, performers stare.
+    if (before <= BLINK_DELAY_S && this.#movedS > BLINK_DELAY_S)
+      void import("./face/auto-blink").then(
+        ({ AutoBlink }) => (this.#blinks = new AutoBlink()),
+        () => {},
+      );
   }
 
   #createPerformer(figure: Figure, number: number): Performer {

@@ -1,7 +1,8 @@
 /** A performer as stage, strings and limb controls see it: the puppet, or an avatar in its place. */
-import { type Group, type Matrix4, Vector3 } from "three";
+import { type Camera, type Group, type Matrix4, type Scene, Vector3, type WebGLRenderer } from "three";
 import type { StagedPose } from "../../motion/extension";
 import type { Figure } from "../../motion/skeleton";
+import type { Look } from "../scenery/look";
 import { SIDES, SOLE_HEIGHT_M } from "./standard-figure";
 
 export interface Performer {
@@ -21,8 +22,15 @@ export interface Performer {
   showsReflection: boolean;
   /** Uses materials for machines without a graphics processor. */
   usesSimpleMaterials: boolean;
-  /** Apply a pose. `seconds` since the last one advances the swing of loose parts; 0 stops it. */
-  apply(pose: StagedPose, seconds: number): void;
+  /**
+   * Apply a pose. `seconds` since the last one advances the swing of loose parts; 0 stops it. `blink` is how far the
+   * eyes are closed, 0..1, if the pose says nothing of them.
+   */
+  apply(pose: StagedPose, seconds: number, blink?: number): void;
+  /** Draw what the next frame needs beforehand. World matrices are up to date. */
+  prepare?(renderer: WebGLRenderer, scene: Scene, camera: Camera, look: Look): void;
+  /** Draw it again: the graphics context was lost. */
+  invalidate?(): void;
   /** Write the world position of a limb's handle into `out` (0 left hand, 1 right hand, 2 left knee, 3 right knee). */
   handle(limb: number, out: Vector3): Vector3;
   /** Return the world matrix of a joint of the streamed figure. */

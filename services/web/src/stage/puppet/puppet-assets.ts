@@ -1,28 +1,18 @@
 /** Shared assets of the puppets of one stage: materials for all, one mesh for equal limb lengths. */
-import {
-  type BufferGeometry,
-  type Camera,
-  type IUniform,
-  type Material,
-  type Matrix4,
-  type Scene,
-  type ShaderMaterial,
-  Vector3,
-} from "three";
+import type { BufferGeometry, IUniform, Material } from "three";
 import { type Figure, figureKey } from "../../motion/skeleton";
-import { type DistantLights, updateDistantLights } from "./distant-lights";
-import { createFigureMaterial, createSimpleFigureMaterial, type PuppetTextures } from "./material";
+import { MATERIAL_PARTS } from "./finish";
+import { createFigureMaterial, type PuppetTextures } from "./material";
 import { takePuppetGeometry } from "./puppet-geometry";
+import { SimpleFigureMaterial } from "./simple-material";
 import type { Detail } from "./surface";
-
-const centre = new Vector3();
 
 export class PuppetAssets {
   readonly material: Material;
   /** Material of the reflection. */
   readonly mirroredMaterial: Material;
   readonly #textures: PuppetTextures;
-  #simpleMaterial: ShaderMaterial | null = null;
+  #simpleMaterials: readonly SimpleFigureMaterial[] | null = null;
   /** Meshes by the limb lengths of their figure. */
   readonly #geometries = new Map<string, Map<Detail, BufferGeometry>>();
 
@@ -33,21 +23,9 @@ export class PuppetAssets {
     this.mirroredMaterial = createFigureMaterial(textures, floorHeight);
   }
 
-  /** Material for machines without a graphics processor. */
-  get simpleMaterial(): Material {
-    return (this.#simpleMaterial ??= createSimpleFigureMaterial(this.#textures));
-  }
-
-  /** Light the simple material as a performer gets it whose root is there. Called before each draw. */
-  lightSimpleMaterial(scene: Scene, camera: Camera, root: Matrix4): void {
-    if (!this.#simpleMaterial) return;
-    updateDistantLights(
-      this.#simpleMaterial.uniforms as DistantLights,
-      scene,
-      camera,
-      centre.setFromMatrixPosition(root),
-    );
-    this.#simpleMaterial.uniformsNeedUpdate = true;
+  /** Materials of the groups of the mesh for machines without a graphics processor. */
+  get simpleMaterials(): readonly SimpleFigureMaterial[] {
+    return (this.#simpleMaterials ??= MATERIAL_PARTS.map((part) => new SimpleFigureMaterial(this.#textures, part)));
   }
 
   /** Return the mesh for a figure, built once per set of limb lengths. */
@@ -72,6 +50,6 @@ export class PuppetAssets {
 
   dispose(): void {
     this.retainOnly([]);
-    for (const material of [this.material, this.mirroredMaterial, this.#simpleMaterial]) material?.dispose();
+    for (const material of [this.material, this.mirroredMaterial, ...(this.#simpleMaterials ?? [])]) material.dispose();
   }
 }

@@ -1,19 +1,17 @@
 /** The mesh of the puppet. It needs no renderer: it can be built while that is still loading. */
 import type { BufferGeometry } from "three";
-import { type Figure, figureKey, JOINTS } from "../../motion/skeleton";
-import { TRUNK_BONES } from "./extended-bones";
+import { type Figure, figureKey } from "../../motion/skeleton";
+import { BONES } from "./bones";
 import { fitToFigure } from "./figure-fit";
 import { GeometryBuilder } from "./geometry-builder";
 import { addArms } from "./parts/arms";
 import { addBodice } from "./parts/bodice";
 import { addHakama } from "./parts/hakama";
+import { addHands } from "./parts/hands";
 import { addHead } from "./parts/head";
 import { addLegs } from "./parts/legs";
 import { addSleeves } from "./parts/sleeves";
 import type { Detail } from "./surface";
-
-/** Bones in the order of the geometry's skin indices: the joints of the contract, the two sleeves, then the trunk's. */
-export const BONES: readonly string[] = [...JOINTS, "l_sleeve", "r_sleeve", ...TRUNK_BONES];
 
 /** Mesh that was built ahead, and what it was built for. */
 let prepared: { readonly key: string; readonly geometry: BufferGeometry } | null = null;
@@ -21,7 +19,7 @@ let prepared: { readonly key: string; readonly geometry: BufferGeometry } | null
 /** Build all parts on a figure in its rest pose. */
 export function buildPuppetGeometry(figure: Figure, detail: Detail): BufferGeometry {
   const builder = new GeometryBuilder(BONES, fitToFigure(figure), detail);
-  for (const add of [addLegs, addArms, addHead, addBodice, addHakama, addSleeves]) add(builder);
+  for (const add of [addLegs, addArms, addHands, addHead, addBodice, addHakama, addSleeves]) add(builder);
   return builder.build();
 }
 

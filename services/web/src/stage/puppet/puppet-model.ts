@@ -3,17 +3,25 @@ import { Matrix4, Quaternion, type SkinnedMesh, Texture, Vector3 } from "three";
 import type { PuppetModel } from "../../export/glb";
 import { type Figure, JOINTS } from "../../motion/skeleton";
 import { encodePng } from "../rendering/canvas";
+import { BONES } from "./bones";
+import { createHeadModel } from "./face/head-model";
 import { PATTERN } from "./finish";
-import { Puppet } from "./puppet";
+import { FINGER_BONES, wristOf } from "./hand/finger-joints";
+import { Puppet, setPuppetExtension } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
+import { PuppetExtension } from "./puppet-extension";
 import { SIDES } from "./standard-figure";
 import { createFaceTexture } from "./texture";
 
 /** Minimum z of a triangle's normals for it to carry the face paint. */
 const MIN_FACE_NORMAL_Z = 0.2;
 
+/** First bone of the fingers: in files they belong to the wrists. */
+const FIRST_FINGER = BONES.indexOf(FINGER_BONES[0]);
+
 /** Create the model of a figure. Needs no graphics context. */
 export function createPuppetModel(figure: Figure): PuppetModel {
+  setPuppetExtension(PuppetExtension);
   // Files do not use the textures of the stage.
   const unpainted = { face: new Texture(), asanoha: new Texture() };
   const puppet = new Puppet(figure, new PuppetAssets(unpainted, { value: 0 }));
@@ -22,8 +30,8 @@ export function createPuppetModel(figure: Figure): PuppetModel {
   const normals = Float32Array.from(values("normal")),
     pattern = values("pattern");
   const vertices = normals.length / 3;
-  const painted = (vertex: number) =>
-    pattern[vertex * 3 + 2] === PATTERN.face && normals[vertex * 3 + 2] > MIN_FACE_NORMAL_Z;
+  const ofHead = (vertex: number) => pattern[vertex * 3 + 2] === PATTERN.face;
+  const painted = (vertex: number) => ofHead(vertex) && normals[vertex * 3 + 2] > MIN_FACE_NORMAL_Z;
   const face: number[] = [],
     body: number[] = [];
   const triangles = geometry.index?.array ?? [];
@@ -32,17 +40,28 @@ export function createPuppetModel(figure: Figure): PuppetModel {
     (corners.every(painted) ? face : body).push(...corners);
   }
   const sleeves = SIDES.map(({ side }) => new SleeveRotation(puppet, side));
-  return {
+  const shape = {
     positions: Float32Array.from(values("position")),
     normals,
     colours: Float32Array.from(values("color")),
-    bones: Uint8Array.from(values("skinIndex")),
-    weights: Float32Array.from(values("skinWeight")),
     faceUvs: Float32Array.from({ length: vertices * 2 }, (_, i) =>
       i % 2 === 0 ? pattern[(i / 2) * 3] : 1 - pattern[((i - 1) / 2) * 3 + 1],
     ),
+  };
+  return {
+    ...shape,
+    bones: Uint8Array.from(values("skinIndex"), (bone) =>
+      bone < FIRST_FINGER ? bone : JOINTS.indexOf(wristOf(BONES[bone])),
+    ),
+    weights: Float32Array.from(values("skinWeight")),
     face: Uint32Array.from(face),
     body: Uint32Array.from(body),
+    separateHead() {
+      const isHead = (_: number, at: number) => ofHead(body[at - (at % 3)]);
+      const back = body.filter(isHead);
+      const rest = Uint32Array.from(body.filter((corner, at) => !isHead(corner, at)));
+      return { head: createHeadModel({ ...shape, face, back }), rest };
+    },
     poseSleeves(pose, seconds, out) {
       puppet.apply(pose, seconds);
       sleeves.forEach((sleeve, at) => sleeve.write(out, at * 4));

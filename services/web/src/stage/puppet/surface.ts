@@ -1,7 +1,7 @@
 /** Parametric surfaces, from which all parts of the puppet are made. Metres. */
 import { CatmullRomCurve3, Quaternion, Vector3 } from "three";
 
-/** How finely a surface is sampled: coarsely, with about a third of the triangles, for software rendering. */
+/** How finely a surface is sampled: coarsely, with about half of the triangles, for software rendering. */
 export type Detail = "full" | "coarse";
 
 /** Vertices and triangles of a part: three numbers per vertex, two for `uvs`. */
@@ -20,7 +20,10 @@ export type UvFunction = (u: number, v: number, at: Vector3) => readonly [number
 
 const DOWN = new Vector3(0, -1, 0);
 const DERIVATIVE_STEP = 1e-3;
-/** Grids with fewer cells across and along keep them all in their coarse meshes. */
+/**
+ * Coarse meshes have half of the columns. Grids with fewer cells across keep them all, and have half of the rows
+ * instead if they have enough: they are thin, like fingers.
+ */
 const MIN_COARSE_COLUMNS = 12;
 const MIN_COARSE_ROWS = 6;
 
@@ -69,8 +72,9 @@ export function curve(keys: readonly (readonly number[])[]): (t: number) => read
 export function grid(at: SurfaceFunction, columns: number, rows: number, uv?: UvFunction): Surface {
   return (detail) => {
     const isCoarse = detail === "coarse";
-    const across = sample(columns, isCoarse && columns >= MIN_COARSE_COLUMNS ? 2 : 1);
-    const along = sample(rows, isCoarse && rows >= MIN_COARSE_ROWS ? 2 : 1);
+    const isThin = columns < MIN_COARSE_COLUMNS;
+    const across = sample(columns, isCoarse && !isThin ? 2 : 1);
+    const along = sample(rows, isCoarse && isThin && rows >= MIN_COARSE_ROWS ? 2 : 1);
     const mesh: SurfaceMesh = { positions: [], normals: [], uvs: [], indices: [] };
     for (const v of along)
       for (const u of across) {
@@ -116,7 +120,8 @@ export interface LatheOptions {
   widthScale?: number;
   depthScale?: number;
   columns?: number;
-  rows?: number;
+  /** Number of rows at equal distances, or `profile`: one at each row of the profile. */
+  rows?: number | "profile";
   uv?: UvFunction;
 }
 
@@ -134,10 +139,12 @@ export function lathe(
   const length = axis.length();
   const turn = new Quaternion().setFromUnitVectors(DOWN, axis.divideScalar(length));
   const radius = curve(profile);
-  const [first, last] = [profile[0][0], profile[profile.length - 1][0]];
+  const places = rows === "profile" ? profile.map(([t]) => t) : [profile[0][0], profile[profile.length - 1][0]];
+  const spans = places.length - 1;
   return grid(
     (u, v) => {
-      const t = first + (last - first) * v;
+      const span = Math.min(Math.floor(v * spans), spans - 1);
+      const t = places[span] + (places[span + 1] - places[span]) * (v * spans - span);
       const r = radius(t)[0] * length;
       const angle = u * 2 * Math.PI;
       return new Vector3(Math.sin(angle) * r * wide, -t * length, Math.cos(angle) * r * deep)
@@ -145,7 +152,7 @@ export function lathe(
         .add(from);
     },
     columns,
-    rows,
+    rows === "profile" ? spans : rows,
     uv,
   );
 }

@@ -4,9 +4,20 @@
  *
  * After FXAA (T. Lottes, NVIDIA, 2009): where the luma of neighbours differs, mix colours along the edge.
  */
-import { FramebufferTexture, type IUniform, LinearFilter, ShaderMaterial, Vector2, type WebGLRenderer } from "three";
-import { FullScreenQuad } from "three/examples/jsm/postprocessing/Pass.js";
-import type { ScreenBox } from "../camera/screen-box";
+import {
+  BufferAttribute,
+  BufferGeometry,
+  Camera,
+  FramebufferTexture,
+  type IUniform,
+  LinearFilter,
+  Mesh,
+  ShaderMaterial,
+  Vector2,
+  type WebGLRenderer,
+} from "three";
+import { type ScreenBox, unionOf } from "../camera/screen-box";
+import { bandsOf } from "./edge-bands";
 
 const FRAGMENT_GLSL = /* glsl */ `
 uniform sampler2D picture; uniform vec2 texel;
@@ -36,51 +47,61 @@ void main() {
 
 /** Distance to the pixels that a smoothed one is mixed of, in pixels. */
 const REACH_PX = 8;
+/** Bands in which the boxes of edges are smoothed. */
+const MAX_BANDS = 12;
 
 export class EdgeSmoothing {
   readonly #texel: IUniform<Vector2> = { value: new Vector2() };
   readonly #picture: IUniform<FramebufferTexture | null> = { value: null };
   readonly #material = new ShaderMaterial({
     uniforms: { texel: this.#texel, picture: this.#picture },
-    vertexShader: "void main() { gl_Position = vec4(position.xy, 0., 1.); }",
+    vertexShader: "attribute vec2 corner; void main() { gl_Position = vec4(corner, 0., 1.); }",
     fragmentShader: FRAGMENT_GLSL,
     depthTest: false,
     depthWrite: false,
     toneMapped: false,
   });
-  readonly #quad = new FullScreenQuad(this.#material);
+  readonly #corners = new BufferAttribute(new Float32Array(MAX_BANDS * 12), 2);
+  readonly #mesh = new Mesh(new BufferGeometry().setAttribute("corner", this.#corners), this.#material);
+  readonly #camera = new Camera();
 
-  /** Smooth what the canvas shows inside `box`, in shares of its width and height (0..1, y down). */
-  apply(renderer: WebGLRenderer, box: ScreenBox): void {
+  constructor() {
+    this.#mesh.frustumCulled = false;
+  }
+
+  /** Smooth what the canvas shows inside `boxes`, in shares of its width and height (0..1, y down). */
+  apply(renderer: WebGLRenderer, boxes: readonly ScreenBox[]): void {
     const { width, height } = renderer.domElement;
-    const copied = clipTo(width, height, box, REACH_PX);
-    const smoothed = clipTo(width, height, box, 0);
-    if (!(smoothed.columns > 0 && smoothed.rows > 0)) return;
+    const { left, bottom, columns, rows } = clipTo(width, height, unionOf(boxes), REACH_PX);
+    if (!(columns > 0 && rows > 0)) return;
     const { properties, state } = renderer;
     const gl = renderer.getContext();
     const picture = this.#fitTexture(width, height);
     renderer.initTexture(picture);
     state.bindTexture(gl.TEXTURE_2D, (properties.get(picture) as { __webglTexture: WebGLTexture }).__webglTexture);
-    const { left, bottom, columns, rows } = copied;
     gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, left, bottom, left, bottom, columns, rows);
+    this.#setBands(bandsOf(boxes, MAX_BANDS));
     const { autoClear } = renderer;
-    const ratio = renderer.getPixelRatio();
     renderer.autoClear = false;
-    renderer.setScissorTest(true);
-    renderer.setScissor(
-      smoothed.left / ratio,
-      smoothed.bottom / ratio,
-      smoothed.columns / ratio,
-      smoothed.rows / ratio,
-    );
-    this.#quad.render(renderer);
-    renderer.setScissorTest(false);
+    renderer.render(this.#mesh, this.#camera);
     renderer.autoClear = autoClear;
   }
 
   dispose(): void {
     this.#picture.value?.dispose();
     this.#material.dispose();
+    this.#mesh.geometry.dispose();
+  }
+
+  #setBands(bands: readonly ScreenBox[]): void {
+    this.#mesh.geometry.setDrawRange(0, bands.length * 6);
+    this.#corners.set(
+      bands.flatMap(({ left, top, right, bottom }) => {
+        const [x0, x1, y0, y1] = [2 * left - 1, 2 * right - 1, 1 - 2 * bottom, 1 - 2 * top];
+        return [x0, y0, x1, y0, x1, y1, x0, y0, x1, y1, x0, y1];
+      }),
+    );
+    this.#corners.needsUpdate = true;
   }
 
   /** Return the texture for a canvas of this size. */

@@ -22,6 +22,11 @@ export class FrameFence {
     return true;
   }
 
+  /** True if another frame can be drawn soon, and not yet. */
+  get isPending(): boolean {
+    return !this.#context.isContextLost() && !this.isReady;
+  }
+
   /** Discard the fence after the context was lost and restored. */
   reset(): void {
     this.#fence = null;

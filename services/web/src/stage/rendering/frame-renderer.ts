@@ -3,10 +3,10 @@ import { ACESFilmicToneMapping, PCFShadowMap, type PerspectiveCamera, type Scene
 import type { ScreenBox } from "../camera/screen-box";
 import type { Look } from "../scenery/look";
 import type { StageCanvas } from "./canvas";
-import { EdgeSmoothing } from "./edge-smoothing";
+import type { EdgeSmoothing } from "./edge-smoothing";
 import { FrameFence } from "./frame-fence";
 import type { Graphics } from "./graphics";
-import { PictureRenderer, pictureSize } from "./picture";
+import type { PictureRenderer } from "./picture";
 import type { AdaptiveQuality, Quality } from "./quality";
 import { SceneWatcher } from "./scene-watcher";
 
@@ -20,9 +20,11 @@ export class FrameRenderer {
   readonly #quality: AdaptiveQuality;
   readonly #fence: FrameFence;
   readonly #watcher = new SceneWatcher();
-  readonly #pictures = new PictureRenderer();
-  /** Null if the context has antialiasing. */
-  readonly #smoothing: EdgeSmoothing | null;
+  /** Null until the first picture is taken. */
+  #pictures: PictureRenderer | null = null;
+  /** Null if the context has antialiasing, and until it is loaded. */
+  #smoothing: EdgeSmoothing | null = null;
+  #needsSmoothing: boolean;
   #width = 1;
   #height = 1;
   #pixelRatio = 1;
@@ -36,7 +38,7 @@ export class FrameRenderer {
   constructor(canvas: StageCanvas, { context, quality }: Graphics) {
     this.#quality = quality;
     this.#fence = new FrameFence(context);
-    this.#smoothing = context.getContextAttributes()?.antialias ? null : new EdgeSmoothing();
+    this.#needsSmoothing = !context.getContextAttributes()?.antialias;
     this.renderer = new WebGLRenderer({ canvas, context });
     this.renderer.toneMapping = ACESFilmicToneMapping;
     this.renderer.shadowMap.enabled = true;
@@ -51,6 +53,11 @@ export class FrameRenderer {
   /** True if the last frame is complete and another can be drawn. */
   get isReady(): boolean {
     return this.#fence.isReady;
+  }
+
+  /** True if the last frame is incomplete and another can be drawn soon. */
+  get isPending(): boolean {
+    return this.#fence.isPending;
   }
 
   /** Set the size of the canvas in CSS pixels. It takes effect with the next frame. */
@@ -81,14 +88,19 @@ export class FrameRenderer {
   }
 
   /**
-   * Draw a frame. `edges` is the box that all edges are in, in CSS pixels; null if there are none. Only the times of
+   * Draw a frame. `edges` are boxes that all edges are in, in CSS pixels; null if there are none. Only the times of
    * frames with edges, in the same quality one after the other, are measured.
    */
-  draw(scene: Scene, camera: PerspectiveCamera, edges: ScreenBox | null): void {
+  draw(scene: Scene, camera: PerspectiveCamera, edges: readonly ScreenBox[] | null): void {
     const { quality } = this;
     this.#applySize();
     this.renderer.render(scene, camera);
-    if (edges) this.#smoothing?.apply(this.renderer, this.#toShares(edges));
+    if (edges && this.#needsSmoothing) this.#loadSmoothing();
+    if (edges)
+      this.#smoothing?.apply(
+        this.renderer,
+        edges.map((box) => this.#toShares(box)),
+      );
     this.#fence.insert();
     this.#watcher.markDrawn();
     const isContinued = this.#drawnQuality === quality && quality === this.#quality.quality;
@@ -98,10 +110,19 @@ export class FrameRenderer {
     this.#sinceDrawnS = 0;
   }
 
+  /** Load what takes pictures. */
+  async loadPictures(): Promise<PictureRenderer> {
+    if (!this.#pictures) {
+      const { PictureRenderer } = await import("./picture");
+      this.#pictures ??= new PictureRenderer();
+    }
+    return this.#pictures;
+  }
+
   /** Render the scene to a PNG in a resolution of at least twice the canvas. */
-  takePicture(scene: Scene, camera: PerspectiveCamera, look: Look): Promise<Blob> {
+  takePicture(pictures: PictureRenderer, scene: Scene, camera: PerspectiveCamera, look: Look): Promise<Blob> {
     this.#isTakingPicture = true;
-    return this.#pictures.render(scene, camera, look, pictureSize(this.#width, this.#height)).finally(() => {
+    return pictures.render(scene, camera, look, this.#width, this.#height).finally(() => {
       this.#isTakingPicture = false;
       this.#quality.restart();
     });
@@ -116,11 +137,24 @@ export class FrameRenderer {
   }
 
   dispose(): void {
-    this.#pictures.dispose();
+    this.#pictures?.dispose();
     this.#smoothing?.dispose();
     this.renderer.dispose();
     // Frees the context's memory at once: browsers keep few contexts and would take one from another stage.
     this.renderer.forceContextLoss();
+  }
+
+  /** Load the smoothing of edges with the first frame, which has none. */
+  #loadSmoothing(): void {
+    this.#needsSmoothing = false;
+    // Without it, edges are rough.
+    void import("./edge-smoothing").then(
+      ({ EdgeSmoothing }) => {
+        this.#smoothing = new EdgeSmoothing();
+        this.invalidate();
+      },
+      () => {},
+    );
   }
 
   #toShares({ left, top, right, bottom }: ScreenBox): ScreenBox {

@@ -17,13 +17,17 @@ export function pictureSize(width: number, height: number): { width: number; hei
 export class PictureRenderer {
   #renderer: WebGLRenderer | null = null;
 
-  /** Render `scene` through `camera` to a PNG of this size. Reject if it cannot be drawn. */
+  /**
+   * Render `scene` through `camera` to a PNG for a stage of so many CSS pixels. Reject if it cannot be drawn.
+   */
   async render(
     scene: Scene,
     camera: PerspectiveCamera,
     look: Look,
-    { width, height }: { width: number; height: number },
+    stageWidth: number,
+    stageHeight: number,
   ): Promise<Blob> {
+    const { width, height } = pictureSize(stageWidth, stageHeight);
     // One renderer for all images: browsers allow few contexts, and release them late.
     if (!this.#renderer || this.#renderer.getContext().isContextLost())
       this.#renderer = new WebGLRenderer({ canvas: createCanvas(1, 1), antialias: true });

@@ -48,8 +48,9 @@ export class SceneWatcher {
   }
 
   readonly #addObject = (object: Object3D): void => {
-    // An object that takes another's place differs, even at the same position.
-    this.#add([object.id]);
+    // An object that takes another's place differs, even at the same position. The parts of a number are so small that
+    // their differences count, however many objects there were.
+    this.#add([object.id & 1023, (object.id >> 10) & 1023, object.id >> 20]);
     this.#add(object.matrixWorld.elements);
     const { color, intensity, angle } = object as Partial<Light & SpotLight>;
     if (intensity !== undefined && color) this.#add([color.r, color.g, color.b, intensity, angle ?? 0]);

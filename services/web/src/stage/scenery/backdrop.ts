@@ -3,6 +3,7 @@
  */
 import { Color, type IUniform, Mesh, PlaneGeometry, ShaderMaterial, Vector2 } from "three";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
+import { createDenseGrid } from "./dense-grid";
 import type { Look } from "./look";
 import { NOISE_GLSL } from "./noise";
 import {
@@ -18,6 +19,12 @@ export const BACKDROP_Z_M = -2.6;
 
 /** Width and height of the plane in metres. */
 const SIZE_M = [26, 14] as const;
+
+/**
+ * Width of the ring around the disc that software rendering reads from a texture, in metres: the cells of the grid
+ * beyond it have no corner on the disc.
+ */
+const DISC_MARGIN_M = 0.4;
 
 export interface BackdropUniforms {
   [name: string]: IUniform;
@@ -112,13 +119,13 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
     fragmentShader: FRAGMENT_GLSL,
   });
   const simple = new ShaderMaterial({
-    uniforms: { ...vignette, ...baked },
+    uniforms: { ...uniforms, ...vignette, ...baked },
     depthWrite: false,
     toneMapped: false,
     vertexShader: SIMPLE_VERTEX_GLSL,
     fragmentShader: SIMPLE_FRAGMENT_GLSL,
   });
-  const [plane, grid] = [new PlaneGeometry(...SIZE_M), new PlaneGeometry(...SIZE_M, 52, 28)];
+  const [plane, grid] = [new PlaneGeometry(...SIZE_M), createDenseGrid(SIZE_M, 48, 28, "lower")];
   const mesh = new Mesh<PlaneGeometry, ShaderMaterial>(plane, detailed);
   mesh.name = "backdrop";
   mesh.position.set(0, 5, BACKDROP_Z_M);
@@ -152,11 +159,15 @@ void main() {
 const SIMPLE_VERTEX_GLSL = /* glsl */ `
 ${BAKED_GLSL}
 ${VIGNETTE_VERTEX_GLSL}
-varying vec2 vPlace;
+uniform vec2 discCentre; uniform float discRadius; uniform vec3 vignetteColour;
+varying vec2 vPlace, vFromDisc; varying vec3 vColour;
 void main() {
-  vPlace = bakedPlace(position.xy + vec2(0., 5.));
+  vec2 at = position.xy + vec2(0., 5.);
+  vPlace = bakedPlace(at);
+  vFromDisc = (at - discCentre) / (discRadius + ${DISC_MARGIN_M});
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
   setVignette();
+  vColour = mix(texture2D(bakedSharp, vPlace).rgb, vignetteColour, vShade);
 }`;
 const FRAGMENT_GLSL = /* glsl */ `
 ${DISPLAYED_BACKDROP_GLSL}
@@ -168,5 +179,9 @@ void main() {
 const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
 ${BAKED_GLSL}
 ${VIGNETTE_VARYING_GLSL}
-varying vec2 vPlace;
-void main() { gl_FragColor = vec4(withVignette(texture2D(bakedSharp, vPlace).rgb), 1.); }`;
+varying vec2 vPlace, vFromDisc; varying vec3 vColour;
+void main() {
+  vec3 colour = vColour;
+  if (dot(vFromDisc, vFromDisc) < 1.) colour = withVignette(texture2D(bakedSharp, vPlace).rgb);
+  gl_FragColor = vec4(colour, 1.);
+}`;

@@ -13,7 +13,8 @@ import {
 } from "three";
 import type { Look } from "./look";
 
-type LightPane = readonly [
+/** Pane of light that faces the performer; colour as sRGB hex, sizes and position in metres. */
+export type LightPane = readonly [
   colour: string,
   strength: number,
   width: number,
@@ -36,11 +37,19 @@ const DAY_PANES: readonly LightPane[] = [
   ["#efe2cc", 1, 14, 14, [0, -1.2, 0]],
 ];
 
+export function studioPanes({ dark }: Look): readonly LightPane[] {
+  return dark ? NIGHT_PANES : DAY_PANES;
+}
+
+export function studioBackground({ dark }: Look): string {
+  return dark ? "#07080d" : "#b9b0a2";
+}
+
 /** Render the prefiltered environment map. The caller disposes of it. */
 export function createEnvironmentMap(renderer: WebGLRenderer, look: Look): Texture {
   const studio = new Scene();
-  studio.background = new Color(look.dark ? "#07080d" : "#b9b0a2");
-  for (const [colour, strength, width, height, at] of look.dark ? NIGHT_PANES : DAY_PANES) {
+  studio.background = new Color(studioBackground(look));
+  for (const [colour, strength, width, height, at] of studioPanes(look)) {
     const material = new MeshBasicMaterial({ color: new Color(colour).multiplyScalar(strength), side: DoubleSide });
     const pane = new Mesh(new PlaneGeometry(width, height), material);
     pane.position.set(...at);

@@ -4,6 +4,7 @@
  * ground.
  */
 import {
+  type BufferAttribute,
   Color,
   type IUniform,
   Matrix4,
@@ -19,9 +20,10 @@ import {
 } from "three";
 import { BACKDROP_GLSL, BACKDROP_Z_M, type BackdropUniforms } from "./backdrop";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
-import { IRRADIANCE_GLSL } from "./irradiance";
+import { createDenseGrid } from "./dense-grid";
 import type { Look } from "./look";
 import { NOISE_GLSL } from "./noise";
+import { REFLECTED_LIGHT_GLSL } from "./reflected-light";
 import {
   updateVignette,
   VIGNETTE_GLSL,
@@ -68,48 +70,59 @@ if (dark < .5) gl_FragColor.rgb = mix(gl_FragColor.rgb, backdrop(vec2(at.x, -.2)
 const SIMPLE_VERTEX_GLSL = /* glsl */ `
 #include <common>
 #include <tonemapping_pars_fragment>
-${IRRADIANCE_GLSL}
+${REFLECTED_LIGHT_GLSL}
+${BAKED_GLSL}
 ${VIGNETTE_VERTEX_GLSL}
-uniform vec3 colour; uniform float ambient; uniform mat4 intoRig; uniform float dark; uniform vec2 travelled;
-varying vec2 vAt, vBoard, vLanding; varying vec3 vWood; varying float vMirror, vHorizon;
+uniform vec3 colour; uniform float ambient, rough, dark; uniform mat4 intoRig; uniform vec2 travelled;
+varying vec2 vBoard, vLanding; varying vec3 vWood, vFar; varying float vMirror, vHorizon;
 void main() {
   vec4 place = modelMatrix * vec4(position, 1.);
   vec4 seen = viewMatrix * place;
   gl_Position = projectionMatrix * seen;
   vec3 eye = normalize(mat3(intoRig) * (place.xyz - cameraPosition));
-  vAt = (intoRig * place).xz;
-  vBoard = vAt + travelled;
+  vec2 at = (intoRig * place).xz;
+  vBoard = at + travelled;
   vec3 bounce = vec3(eye.x, -eye.y, eye.z);
-  vLanding = vec2(vAt.x, 0.) + bounce.xy * (${BACKDROP_Z_M.toFixed(2)} - vAt.y) / min(bounce.z, -1e-3);
+  vLanding = vec2(at.x, 0.) + bounce.xy * (${BACKDROP_Z_M.toFixed(2)} - at.y) / min(bounce.z, -1e-3);
   float fresnel = .05 + .95 * pow(1. - abs(eye.y), 5.);
-  vec3 wood = colour * (RECIPROCAL_PI * irradiance(seen.xyz, normalize(normalMatrix * normal)) + ambient)
-    * mix(1., mix(.35, 1., exp(-.28 * dot(vAt, vAt))), dark);
+  vec3 wood = reflectedLight(seen.xyz, normalize(normalMatrix * normal), colour, ambient, rough)
+    * mix(1., mix(.35, 1., exp(-.28 * dot(at, at))), dark);
   // Displayed colours have about the roots of linear ones: their squares add up.
   vWood = pow(ACESFilmicToneMapping(wood), vec3(2. / 2.2));
   vMirror = mix(.35 * fresnel, .95 * (.9 * fresnel + .13), dark);
+  vWood *= 1. - vMirror * (1. - dark);
   vHorizon = mix(
-    max(smoothstep(.5, 2.6, -vAt.y + .15 * abs(vAt.x)), .8 * smoothstep(.9, 3.4, length(vAt))),
-    smoothstep(1.3, ${(0.2 - BACKDROP_Z_M).toFixed(2)}, -vAt.y + .22 * abs(vAt.x)),
+    max(smoothstep(.5, 2.6, -at.y + .15 * abs(at.x)), .8 * smoothstep(.9, 3.4, length(at))),
+    smoothstep(1.3, ${(0.2 - BACKDROP_Z_M).toFixed(2)}, -at.y + .22 * abs(at.x)),
     dark);
+  vFar = texture2D(bakedBlurred, bakedPlace(vec2(at.x, mix(-.2, .02, dark)))).rgb;
   setVignette();
 }`;
 const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
 uniform float dark;
-varying vec2 vAt, vBoard, vLanding; varying vec3 vWood; varying float vMirror, vHorizon;
+varying vec2 vBoard, vLanding; varying vec3 vWood, vFar; varying float vMirror, vHorizon;
 ${NOISE_GLSL}
 ${BAKED_GLSL}
 ${VIGNETTE_VARYING_GLSL}
 void main() {
-  float grain = noise2(vBoard * vec2(2., 26.));
+  float grain = noise2(vBoard * vec2(2., 26.)) - .5;
   float gap = smoothstep(.478, .497, abs(fract(vBoard.x * 1.55) - .5));
-  vec3 mirrored = texture2D(bakedBlurred, bakedPlace(vLanding + vec2((grain - .5) * .03, 0.))).rgb;
-  mirrored *= mirrored;
-  vec3 wood = vWood * (1. + mix(.05, .5, dark) * (grain - .5)) * (1. - mix(.1, .6, dark) * gap);
-  vec3 shown = sqrt(mix(wood * (1. - vMirror), wood * (1. - .4 * gap * vMirror), dark) + vMirror * mirrored);
-  if (vHorizon > 0.)
-    shown = mix(shown, texture2D(bakedBlurred, bakedPlace(vec2(vAt.x, mix(-.2, .02, dark)))).rgb, vHorizon);
-  gl_FragColor = vec4(withVignette(shown), 1.);
+  vec3 wood = vWood * (1. + mix(.05, .5, dark) * grain) * (1. - mix(.1, .6, dark) * gap);
+  vec3 mirrored = texture2D(bakedBlurred, bakedPlace(vLanding + vec2(.03 * grain, 0.))).rgb;
+  vec3 shown = sqrt(wood + vMirror * (1. - .4 * dark * gap) * mirrored * mirrored);
+  gl_FragColor = vec4(withVignette(mix(shown, vFar, vHorizon)), 1.);
 }`;
+
+/** Return the plane as a grid, which is denser where performers stand. */
+function createGrid(): PlaneGeometry {
+  const grid = createDenseGrid(SIZE_M, 56, 44, "upper");
+  // Diagonals towards the centre in front, as lights gleam: across them their edges would be steps.
+  const { array } = grid.index as BufferAttribute;
+  for (let cell = 0; cell < array.length; cell += 6)
+    if (grid.attributes.position.getX(array[cell]) < 0)
+      [array[cell + 2], array[cell + 3]] = [array[cell + 4], array[cell]];
+  return grid;
+}
 
 export interface Floor {
   readonly mesh: Mesh;
@@ -135,17 +148,26 @@ export function createFloor({ backdrop, vignette, baked }: FloorSurroundings, ri
   const opacityNear: IUniform<number> = { value: 1 };
   const colour: IUniform<Color> = { value: new Color() };
   const ambient: IUniform<number> = { value: 0 };
+  const rough: IUniform<number> = { value: 1 };
   const placed = { ...vignette, travelled: { value: offset }, intoRig };
   const glossy = new MeshStandardMaterial({ transparent: true });
   glossy.onBeforeCompile = (shader) => patchShader(shader, { ...backdrop, ...placed, opacityNear });
   const simple = new ShaderMaterial({
-    uniforms: { ...UniformsUtils.clone(UniformsLib.lights), ...placed, ...baked, dark: backdrop.dark, colour, ambient },
+    uniforms: {
+      ...UniformsUtils.clone(UniformsLib.lights),
+      ...placed,
+      ...baked,
+      dark: backdrop.dark,
+      colour,
+      ambient,
+      rough,
+    },
     vertexShader: SIMPLE_VERTEX_GLSL,
     fragmentShader: SIMPLE_FRAGMENT_GLSL,
     lights: true,
     toneMapped: false,
   });
-  const [plane, grid] = [new PlaneGeometry(...SIZE_M), new PlaneGeometry(...SIZE_M, 52, 18)];
+  const [plane, grid] = [new PlaneGeometry(...SIZE_M), createGrid()];
   const mesh = new Mesh<PlaneGeometry, MeshStandardMaterial | ShaderMaterial>(plane, glossy);
   mesh.name = "floor";
   mesh.rotation.x = -Math.PI / 2;
@@ -170,7 +192,7 @@ export function createFloor({ backdrop, vignette, baked }: FloorSurroundings, ri
       glossy.color.set(floor.colour);
       colour.value.set(floor.colour);
       ambient.value = floor.ambient;
-      glossy.roughness = floor.roughness;
+      glossy.roughness = rough.value = floor.roughness;
       glossy.envMapIntensity = floor.environment;
       opacityNear.value = floor.opacity;
     },

@@ -42,11 +42,9 @@ export interface ControlBar {
 export const HOOK_OFFSET_M = 0.028;
 
 function createGeometry(): BufferGeometry {
-  const crossRod = lathe(new Vector3(-0.15, 0, 0), new Vector3(0.15, 0, 0), ROD_PROFILE, { columns: 10, rows: 26 });
-  const mainRod = lathe(new Vector3(0, 0.008, -0.1), new Vector3(0, 0.008, 0.1), ROD_PROFILE, {
-    columns: 10,
-    rows: 26,
-  });
+  const detail = { columns: 10, rows: "profile" } as const;
+  const crossRod = lathe(new Vector3(-0.15, 0, 0), new Vector3(0.15, 0, 0), ROD_PROFILE, detail);
+  const mainRod = lathe(new Vector3(0, 0.008, -0.1), new Vector3(0, 0.008, 0.1), ROD_PROFILE, detail);
   const binding = ring(new Vector3(0, 0.012, 0), new Vector3(0, 1, 0), 0.017, 0.0032);
   const hook = ring(new Vector3(0, -0.018, 0), new Vector3(0, 0, 1), 0.01, 0.0022);
   const parts: [Surface, string][] = [

@@ -2,18 +2,20 @@ import { Texture, Vector3 } from "three";
 import { expect, test } from "vitest";
 import { createExtendedPose, extendPose, type StagedPose } from "../../../src/motion/extension";
 import { createWorldTransforms, type Figure, JOINTS, worldTransforms } from "../../../src/motion/skeleton";
-import { TRUNK_BONES } from "../../../src/stage/puppet/extended-bones";
-import { Puppet } from "../../../src/stage/puppet/puppet";
+import { TRUNK_BONES } from "../../../src/stage/puppet/bones";
+import { Puppet, setPuppetExtension } from "../../../src/stage/puppet/puppet";
 import { PuppetAssets } from "../../../src/stage/puppet/puppet-assets";
-import { extensionVectors, goldenExtensionTrack } from "../../golden-extensions";
+import { PuppetExtension } from "../../../src/stage/puppet/puppet-extension";
+import { extensionVectors, goldenBody } from "../../golden-extensions";
 
+setPuppetExtension(PuppetExtension);
 const golden = extensionVectors();
 const assets = new PuppetAssets({ face: new Texture(), asanoha: new Texture() }, { value: 0 });
 
 function puppetOf(vector: (typeof golden.poses)[number]): { puppet: Puppet; pose: StagedPose; extended: StagedPose } {
   const figure: Figure = { offsets: Float64Array.from(vector.offsets), tips: new Float64Array(54) };
   const pose = { root: Float64Array.from(vector.root), rotations: Float64Array.from(vector.rotations) };
-  const { extension } = goldenExtensionTrack(golden.tracks[vector.track]);
+  const extension = goldenBody(golden.tracks[vector.track]);
   const world = worldTransforms(figure, pose, createWorldTransforms());
   const extended = extendPose(figure, world, Float64Array.from(vector.values), createExtendedPose(extension));
   return { puppet: new Puppet(figure, assets), pose, extended: { ...pose, extended } };

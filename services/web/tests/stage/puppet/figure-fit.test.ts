@@ -2,8 +2,8 @@ import fc from "fast-check";
 import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { JOINTS } from "../../../src/motion/skeleton";
+import { BONES } from "../../../src/stage/puppet/bones";
 import { figureScale, fitToFigure, restPositions } from "../../../src/stage/puppet/figure-fit";
-import { BONES } from "../../../src/stage/puppet/puppet-geometry";
 import {
   CROWN,
   HEAD_CENTRE,

@@ -49,6 +49,15 @@ describe("surfaces", () => {
       { columns: 64, rows: 400 },
     );
     expect(Math.abs(volume(cylinder))).toBeGreaterThan(0.97 * Math.PI * 2);
+    const cone: [number, number][] = [
+      [0, 0],
+      [0.9, 0.45],
+      [1, 0],
+    ];
+    const turned = lathe(new Vector3(), new Vector3(0, -2, 0), cone, { columns: 64, rows: "profile" });
+    // two cones with a common base at the middle row of the profile
+    expect(Math.abs(volume(turned))).toBeCloseTo((Math.PI * 0.9 ** 2 * 2) / 3, 1);
+    expect(turned("full").positions.length / 3).toBe(65 * 3);
     expect(volume(box(new Vector3(), [1, 2, 3], 0.4))).toBeCloseTo(6, 6);
   });
 

@@ -71,6 +71,14 @@ test("objects that come, go, hide or take another's place are noticed", () => {
   expect(isNoticed(() => group.remove(mesh).add(mesh.clone()))).toBe(true);
 });
 
+test("an object is told from another after many thousands of objects", () => {
+  const [group] = scene.children;
+  let last = new Mesh();
+  while (last.id < 20_000) last = new Mesh();
+  group.add(last);
+  expect(isNoticed(() => group.remove(last).add(new Mesh()))).toBe(true);
+});
+
 test("lights, morphs, instances and further numbers are noticed", () => {
   const light = new DirectionalLight();
   const face = new Mesh(new PlaneGeometry(), new MeshBasicMaterial());
