@@ -14,7 +14,7 @@ UV := $(shell command -v uv 2>/dev/null || echo .tools/bin/uv)
 export PATH := $(CURDIR)/.tools/node:$(PATH)
 # some machines forbid Python to keep compiled modules: each of the many processes that start would compile them again
 unexport PYTHONDONTWRITEBYTECODE
-WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/v1 $(wildcard services/web/vite.*.ts) services/web/compress_page.py proto/prior.json proto/constants.json proto/joint_names.json -type f 2>/dev/null)
+WEB_SOURCES := $(shell find services/web/src services/web/public services/web/examples services/web/index.html services/web/v1 $(wildcard services/web/vite.*.ts) services/web/compress_page.py proto/prior.json proto/constants.json proto/joint_names.json proto/hand_face_names.json -type f 2>/dev/null)
 
 .PHONY: demo-data simulate package pictures test-webdriver test-nightly verify-compose verify-attack soak help setup demo test lint test-python test-web vectors prior clean
 

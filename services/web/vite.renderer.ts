@@ -39,14 +39,16 @@ const COMPLETE = /\/WebXRManager\.js\?complete$/;
 const INSTALLER = /\/src\/immersive\/complete-renderer\.ts$/;
 
 /**
- * Methods that the page never calls: three.js's own file format, and picking, which the page does by the positions of
- * the handles.
+ * Methods that the page never calls: three.js's own file format, picking, which the page does by the positions of the
+ * handles, tangents, and the renderer's copies of textures and pixels.
  */
-const UNUSED_METHOD = /^\t(?:toJSON|fromJSON|raycast)\([^)]*\) \{\n.*?^\t\}\n/gms;
+const UNUSED_METHOD = /^\t(?:toJSON|fromJSON|raycast|computeTangents)\([^)]*\) \{\n.*?^\t\}\n/gms;
+const UNUSED_RENDERER_METHOD =
+  /^\t\tthis\.(?:readRenderTargetPixels(?:Async)?|copyTextureToTexture) = (?:async )?function \([^)]*\) \{\n.*?^\t\t\};\n/gms;
 
 /** Remove the unused methods of the classes in a module of three.js. */
 export function removeUnusedMethods(code: string): string {
-  return code.replace(UNUSED_METHOD, "");
+  return code.replace(UNUSED_METHOD, "").replace(UNUSED_RENDERER_METHOD, "");
 }
 
 /** Replaces `REPLACED_MODULES`, and removes unused methods. */
@@ -64,7 +66,7 @@ export const reducedRenderer: Plugin = {
     },
   },
   transform: {
-    filter: { id: /\/three\/src\/.*\.js$/, code: /\b(?:toJSON|fromJSON|raycast)\(/ },
+    filter: { id: /\/three\/src\/.*\.js$/, code: /\b(?:toJSON|fromJSON|raycast)\(|copyTextureToTexture = / },
     handler: removeUnusedMethods,
   },
 };

@@ -19,8 +19,9 @@ from statistics import median
 
 import numpy as np
 
-from bunraku.codec.extension_encoder import encode_extension
-from bunraku.codec.extension_track import decode_extension_block, pack_extension
+from bunraku.codec.extension.body_joints import pack_body
+from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.track import decode_extension_block
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S
@@ -35,6 +36,7 @@ from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.rest_pose import REFERENCE_LEG_M
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import TIP_JOINTS, Figure, world_transforms
+from tests.bench.extension_rates import measure_face_kbps, measure_fingers_kbps
 from tests.motion.readers.fbx_writer import write_fbx
 from tests.motion.readers.sources import write_acclaim, write_glb, write_zip
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
@@ -44,7 +46,6 @@ MAX_SECONDS = 8.0
 """Length to which clips are cut for the comparison of formats."""
 UPLOAD_FRAMES, UPLOAD_FPS = 1_800, 60.0
 REPEATS = 5
-MISSING = ("fingers_kbps", "face_kbps")
 SHARE_MEAN_ERROR_MM = 1.0
 """Mean error at which the bytes of a motion with its extension are compared with those of the motion alone."""
 
@@ -115,7 +116,7 @@ def body_share(analysis: Analysis) -> float:
         pose = extend_pose(figure, extension.extension, *world_transforms(figure, root, rotations), values)
         extended_errors.append(1e3 * float(np.linalg.norm(_points(figure, pose) - truth, axis=-1).mean()))
         sizes.append(sum(map(len, level.blocks)))
-        added = sum(map(len, extended_level.blocks)) + len(pack_extension(extension.extension))
+        added = sum(map(len, extended_level.blocks)) + len(pack_body(extension.extension))
         extended_sizes.append(sizes[-1] + added)
 
     def bytes_at(mean_errors: list[float], all_bytes: list[int]) -> float:
@@ -174,7 +175,9 @@ def main() -> None:
         print(f"{name:<18}{figure}{fits[-1][0]:10.2f}{fits[-1][1]:7.1f}{shares[-1]:8.3f}{trips[-1]:12.4f}{cells}")
     seconds = upload_seconds()
     print(", ".join(f"{name}: {taken:.2f} s" for name, taken in seconds.items()), "for 30 s at 60 frames/s")
-    figures: dict[str, float | None] = {
+    fingers_kbps, face_kbps = measure_fingers_kbps(), measure_face_kbps()
+    print(f"synthetic takes of 30 s at 60 frames/s: two hands {fingers_kbps:.3f} kbit/s, face {face_kbps:.3f} kbit/s")
+    figures = {
         "agree_mm_max": round(max(mm for mm, _ in agree), 4),
         "agree_ms_max": round(max(ms for _, ms in agree), 3),
         "times_bvh_fbx": round(seconds["fbx"] / seconds["bvh"], 3),
@@ -183,7 +186,8 @@ def main() -> None:
         "fit_mean_mm_max": round(max(mean for mean, _ in fits), 2),
         "fit_max_mm_max": round(max(largest for _, largest in fits), 1),
         "body_share": round(float(np.exp(np.mean(np.log1p(shares)))) - 1, 3),
-        **dict.fromkeys(MISSING),
+        "fingers_kbps": round(fingers_kbps, 3),
+        "face_kbps": round(face_kbps, 3),
     }
     print(json.dumps(figures))
 

@@ -102,8 +102,8 @@ export class PlaybackController {
   }
 
   /**
-   * Put a motion on the stage: in the session, for all its viewers, or in a new session if there is none. On a phone the
-   * library is closed, unless `keepsLibrary`.
+   * Put a motion on the stage: in the session, for all its viewers, or in a new session if there is none. On a phone
+   * the library is closed, unless `keepsLibrary`.
    */
   async playMotion(id: string, keepsLibrary = false): Promise<void> {
     const { library, page, reducedMotion } = this.options;

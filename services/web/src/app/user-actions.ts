@@ -77,6 +77,7 @@ export function createUserActions(app: AppParts): UserActions {
     ask: (limb) => app.limbs.act("ask", limb),
     withdraw: (limb) => app.limbs.act("withdraw", limb),
     give: (limb) => app.limbs.act("give", limb),
+    join: () => app.limbs.act("join"),
     select: (limb) => app.limbs.act("hold", limb),
     press: (input, down) => {
       const { commands } = app.limbs;
@@ -119,6 +120,7 @@ export function createKeyActions(app: AppParts): PageActions {
     next_dancer: () => app.limbs.selectPerformer("next"),
     ask: () => app.limbs.act("ask"),
     give: () => app.limbs.act("give"),
+    join: () => app.limbs.act("join"),
     play: () => app.playback.togglePlaying(),
     back: () => app.playback.current?.seekByBlocks(-1, performance.now()),
     forward: () => app.playback.current?.seekByBlocks(1, performance.now()),

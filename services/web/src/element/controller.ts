@@ -269,8 +269,10 @@ export class ElementController {
   #updateBar(): void {
     const { playback } = this;
     const isEditable = playback?.isEditable ?? false;
+    // A sound that is found later would move the buttons under a pointer.
+    const isKnown = Boolean(playback?.viewer.figure);
     this.#view.setBar(
-      this.#controls && playback !== null && (isEditable || this.#canClaimLimbs || this.#hasSound),
+      this.#controls && isKnown && (isEditable || this.#canClaimLimbs || this.#hasSound),
       isEditable ? this.playing : null,
     );
   }
@@ -280,6 +282,7 @@ export class ElementController {
       next_dancer: () => this.#limbController.selectNextPerformer(),
       ask: () => this.#limbController.requestLimb(),
       give: () => this.#limbController.handOver(),
+      join: () => this.#limbController.joinHands(),
       play: () => this.setPlaying(!this.playing),
       sound: () => this.soundController.toggle(),
       back: () => this.playback?.seekByBlocks(-1, performance.now()),

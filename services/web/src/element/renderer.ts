@@ -1,5 +1,6 @@
 /** Rendering of an embedded stage, in the size of its element and while the element is visible. */
 import type { ClaimController } from "../engine/claim-controller";
+import { FrameLoop } from "../engine/frame-loop";
 import type { Playback } from "../engine/playback";
 import type { StageController } from "../engine/stage-controller";
 import { createPageActions, type PageActions } from "../input/command-dispatcher";
@@ -20,7 +21,7 @@ const SIDE_BAR_MAX_HEIGHT_PX = 380;
 /** Key actions that the element supports, other than claiming and moving limbs. */
 export type ElementKeyActions = Pick<
   PageActions,
-  "next_dancer" | "ask" | "give" | "play" | "back" | "forward" | "sound"
+  "next_dancer" | "ask" | "give" | "join" | "play" | "back" | "forward" | "sound"
 >;
 
 export class ElementRenderer {
@@ -37,7 +38,7 @@ export class ElementRenderer {
   #isVisible = true;
   #firstPoseReported = false;
   #closed = false;
-  #animationFrame = 0;
+  #frameLoop: FrameLoop | null = null;
   readonly #observers: { disconnect(): void }[] = [];
 
   constructor(
@@ -116,14 +117,17 @@ export class ElementRenderer {
     }
     this.#resize();
     if (this.#playback) this.stageController.setPlayback(this.#playback);
-    this.#animationFrame = requestAnimationFrame(() => this.#draw());
+    this.#frameLoop = new FrameLoop(
+      () => this.#draw(),
+      () => this.#isVisible && (this.stageController?.stage.isLate ?? false),
+    );
     return null;
   }
 
   /** Stop drawing and free the graphics. */
   close(): void {
     this.#closed = true;
-    cancelAnimationFrame(this.#animationFrame);
+    this.#frameLoop?.stop();
     for (const observer of this.#observers) observer.disconnect();
     document.removeEventListener("visibilitychange", this.#onVisibilityChange);
     this.stageController?.stage.dispose();
@@ -152,7 +156,6 @@ export class ElementRenderer {
   }
 
   #draw(): void {
-    this.#animationFrame = requestAnimationFrame(() => this.#draw());
     const { stageController } = this;
     if (!stageController || !this.#isVisible) return;
     const now = performance.now();

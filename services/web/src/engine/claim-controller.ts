@@ -6,7 +6,7 @@ import { PerformerSelection } from "../input/performer-selection";
 import type { VelocityInputs } from "../input/velocity-input";
 import { type LimbState, limbHolders, limbName, limbRequesters, limbsInKeyOrder } from "../ui/limb-state";
 import { controlName } from "../ui/mapping/control-name";
-import { limbNumber } from "../wire/limbs";
+import { isHand, limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
 import type { Playback } from "./playback";
 
 /** Inputs that the stage bundle provides, after the page was built. */
@@ -50,15 +50,17 @@ export interface ClaimView {
 }
 
 export class ClaimController {
-  stageInputs: StageInputs | null = null;
   connected = false;
   /** True if this page may not claim limbs. */
   viewOnly = false;
   /** Performer whose limbs keys, gamepad and page controls act on. */
   readonly selectedPerformer = new PerformerSelection(() => this.render());
+  #stageInputs: StageInputs | null = null;
   #playback: Playback | null = null;
   /** Last limb whose claim failed: the one that a request without a limb asks for. */
   #contestedLimb: number | null = null;
+  /** Bonds of this page's hands that were announced. */
+  #announcedBonds: readonly string[] = [];
 
   constructor(
     private readonly view: ClaimView,
@@ -66,19 +68,25 @@ export class ClaimController {
     private readonly translator = pageTranslator,
   ) {}
 
+  /** Inputs of the stage. Before they are set no limb can be claimed. */
+  set stageInputs(inputs: StageInputs) {
+    this.#stageInputs = inputs;
+    this.render();
+  }
+
   /** Use another session from now on. */
   setPlayback(playback: Playback): void {
     this.#playback = playback;
     this.#contestedLimb = null;
     const { viewer, puppeteer } = playback;
-    if (this.stageInputs) this.stageInputs.hands.puppeteer = puppeteer;
+    if (this.#stageInputs) this.#stageInputs.hands.puppeteer = puppeteer;
     const on = <T>(name: string, listener: (detail: T) => void) =>
       puppeteer.addEventListener(name, (event) => listener((event as CustomEvent<T>).detail));
     const render = () => this.render();
     const updateCount = () => {
       this.selectedPerformer.count = Math.max(1, viewer.performers.length);
       // Release the limbs of performers that left the stage.
-      this.stageInputs?.hands.releaseAll(limbNumber(this.selectedPerformer.count, 0));
+      this.#stageInputs?.hands.releaseAll(limbNumber(this.selectedPerformer.count, 0));
     };
     updateCount();
     viewer.addEventListener("figure", updateCount);
@@ -87,7 +95,7 @@ export class ClaimController {
     on("welcome", render);
     on("presence", render);
     on<{ limb: number }>("refusal", ({ limb }) => {
-      this.stageInputs?.hands.onRefused(limb);
+      this.#stageInputs?.hands.onRefused(limb);
       this.onClaimRefused(limb);
     });
     on<{ limb: number; asked: boolean }>("grant", ({ limb, asked }) => {
@@ -101,13 +109,15 @@ export class ClaimController {
       );
       this.render();
     });
+    on<{ reason: string }>("bondend", ({ reason }) => this.view.toast(this.#describeBondEnd(reason)));
+    on("presence", () => this.#announceBonds());
     on<{ detail: string }>("notice", ({ detail }) => this.view.notice(this.translator.translateServerText(detail)));
   }
 
   /** Return the state of all performers' limbs. Claims of this page are shown before the session confirms them. */
   limbStates(): LimbState[] {
     const { puppeteer, viewer } = this.#playback ?? {};
-    const { hands, velocity } = this.stageInputs ?? {};
+    const { hands, velocity } = this.#stageInputs ?? {};
     const context = [
       viewer?.presence ?? null,
       puppeteer?.id ?? null,
@@ -138,10 +148,10 @@ export class ClaimController {
   }
 
   render(): void {
-    const { hands, velocity } = this.stageInputs ?? {};
+    const { hands, velocity } = this.#stageInputs ?? {};
     this.view.render({
       limbs: this.limbStates(),
-      isReady: this.connected && this.#playback !== null && !this.viewOnly,
+      isReady: this.connected && this.#stageInputs !== null && this.#playback !== null && !this.viewOnly,
       performer: this.selectedPerformer.performer,
       giveKey: this.#keyHint("give"),
       selectedLimb: velocity?.selectedLimb ?? null,
@@ -164,17 +174,17 @@ export class ClaimController {
 
   /** Claim a limb if it is free; else show its holder. Returns whether it is held. */
   claim(limb: number, source: HoldSource): boolean {
-    if (!this.isFree(limb) && !this.stageInputs?.hands.source(limb)) {
+    if (!this.isFree(limb) && !this.#stageInputs?.hands.source(limb)) {
       this.onClaimRefused(limb);
       return false;
     }
-    return this.stageInputs?.hands.claim(limb, source) ?? false;
+    return this.#stageInputs?.hands.claim(limb, source) ?? false;
   }
 
   /** Claim a limb, or release it if this page holds it. */
   toggleClaim(limb: number): void {
     if (this.viewOnly) return;
-    const { hands, velocity } = this.stageInputs ?? {};
+    const { hands, velocity } = this.#stageInputs ?? {};
     if (hands?.source(limb)) hands.release(limb);
     else velocity?.hold(limb);
   }
@@ -183,7 +193,7 @@ export class ClaimController {
   onClaimRefused(limb: number): void {
     const state = this.limbStates()[limb];
     if (this.viewOnly || !state) return;
-    this.stageInputs?.shakeRing(limb);
+    this.#stageInputs?.shakeRing(limb);
     const { holder, requestedByMe } = state;
     const name = this.#limbName(limb);
     if (!holder || holder.mine) {
@@ -229,7 +239,42 @@ export class ClaimController {
   handOver(limb = this.#nextRequestedLimb()): void {
     if (this.viewOnly) return;
     if (limb === null) this.view.toast(this.translator.translate("Nobody is asking for your strings"));
-    else this.stageInputs?.hands.release(limb);
+    else this.#stageInputs?.hands.release(limb);
+  }
+
+  /**
+   * Join two hands that this page holds, or one with a free hand, which is led; part them if they are joined. The hand
+   * opposite comes first: dancers face each other.
+   */
+  joinHands(): void {
+    const { puppeteer } = this.#playback ?? {};
+    if (this.viewOnly || !puppeteer) return;
+    const hands = limbsInKeyOrder(this.selectedPerformer.count).filter(isHand);
+    const held = hands.filter((limb) => this.#stageInputs?.hands.source(limb));
+    const bond = puppeteer.bonds.find((pair) => pair.some((limb) => held.includes(limb)));
+    if (bond) puppeteer.unbond(bond[0], bond[1]);
+    else if (held.length === 0) this.view.toast(this.translator.translate("Hold a hand, then join it with another"));
+    else {
+      const [first, second] = held;
+      const other = second ?? hands.filter((limb) => this.isFree(limb)).sort(byDistanceFrom(first))[0];
+      if (other === undefined) this.view.toast(this.translator.translate("These hands cannot be joined"));
+      else puppeteer.bond(first, other);
+    }
+  }
+
+  #describeBondEnd(reason: string): string {
+    if (reason === "apart") return this.translator.translate("The dancers are too far apart to join hands");
+    if (reason === "released" || reason === "lost") return this.translator.translate("The hands are apart again");
+    return this.translator.translate("These hands cannot be joined");
+  }
+
+  /** Announce the bonds of this page's hands that have begun. */
+  #announceBonds(): void {
+    const { bonds = [] } = this.#playback?.puppeteer ?? {};
+    const own = bonds.filter((pair) => pair.some((limb) => this.#stageInputs?.hands.source(limb))).map(String);
+    if (own.some((pair) => !this.#announcedBonds.includes(pair)))
+      this.view.toast(this.translator.translate("The hands are joined"));
+    this.#announcedBonds = own;
   }
 
   #nextRequestedLimb(): number | null {
@@ -241,7 +286,7 @@ export class ClaimController {
   }
 
   #onLimbGranted(limb: number): void {
-    const { hands, velocity } = this.stageInputs ?? {};
+    const { hands, velocity } = this.#stageInputs ?? {};
     if (!hands?.claim(limb, "velocity")) {
       this.#playback?.puppeteer.release(limb);
       return;
@@ -259,4 +304,12 @@ export class ClaimController {
     const control = controlsOf(this.getMapping(), command).find((one) => !isPadControl(one));
     return control === undefined ? null : controlName(control, this.translator);
   }
+}
+
+/** Return an order of hands to join with `hand`: those of other performers first, and of them the opposite ones. */
+function byDistanceFrom(hand: number): (a: number, b: number) => number {
+  const rank = (limb: number) =>
+    2 * Number(performerOfLimb(limb) === performerOfLimb(hand)) +
+    Number(limbWithinPerformer(limb) === limbWithinPerformer(hand));
+  return (a, b) => rank(a) - rank(b);
 }

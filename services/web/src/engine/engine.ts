@@ -16,6 +16,7 @@ import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
 import { AvatarModels } from "./avatar-models";
 import { changedParts } from "./changed-parts";
 import { ClaimController } from "./claim-controller";
+import { FrameLoop } from "./frame-loop";
 import type { ImmersiveController } from "./immersive-controller";
 import type {
   EngineCommand,
@@ -56,6 +57,7 @@ export class Engine {
   /** Add this to a time of the page's clock for the time of this realm's. */
   readonly #clockShiftMs: number;
   #controller: StageController | null = null;
+  #frameLoop: FrameLoop | null = null;
   #describeStage: typeof import("./stage-state").describeStage | null = null;
   /** Builds a mesh for the stage; null while its code is not loaded. */
   #prepareMesh: ((figure: Figure) => void) | null = null;
@@ -127,13 +129,17 @@ export class Engine {
       }),
     );
     this.send({ type: "ready" });
-    requestAnimationFrame(() => this.#drawFrame());
+    this.#frameLoop = new FrameLoop(
+      () => this.#drawFrame(),
+      () => this.#controller?.stage.isLate ?? false,
+    );
   }
 
   /** Close the connections, stop drawing and free the graphics. */
   close(): void {
     this.#isClosed = true;
     clearInterval(this.#statisticsTimer);
+    this.#frameLoop?.stop();
     this.#playback?.close();
     this.#controller?.stage.dispose();
     this.#playback = this.#controller = null;
@@ -284,6 +290,7 @@ export class Engine {
   #onLimbAction(action: LimbAction, limb: number | null): void {
     if (action === "ask") this.#claims.requestLimb(limb ?? undefined);
     else if (action === "give") this.#claims.handOver(limb ?? undefined);
+    else if (action === "join") this.#claims.joinHands();
     else if (limb === null) return;
     else if (action === "toggle") this.#claims.toggleClaim(limb);
     else if (action === "withdraw") this.#claims.withdrawRequest(limb);
@@ -298,8 +305,6 @@ export class Engine {
   }
 
   #drawFrame(): void {
-    if (this.#isClosed) return;
-    requestAnimationFrame(() => this.#drawFrame());
     const controller = this.#controller;
     if (!controller || !this.#describeStage || this.#isImmersive) return;
     const now = performance.now();

@@ -89,7 +89,7 @@ export interface PlaybackRequest {
 }
 
 /** Actions on a limb by its controls on the page. Null means the limb that the action refers to by default. */
-export type LimbAction = "toggle" | "hold" | "ask" | "withdraw" | "give";
+export type LimbAction = "toggle" | "hold" | "ask" | "withdraw" | "give" | "join";
 
 export type EngineCommand =
   | { type: "set"; settings: Partial<EngineSettings> }

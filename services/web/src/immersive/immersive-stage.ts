@@ -191,6 +191,7 @@ export class ImmersiveStage {
     this.#pedestal.position.set(x, y, z);
     this.#pedestal.scale.set(1, Math.max(depth, 1e-3), 1);
     this.scene.updateMatrixWorld();
+    this.#performerGroup.prepare(this.renderer, this.scene, this.camera, this.#look);
   }
 
   /** Release all graphics resources but those of the renderer. */

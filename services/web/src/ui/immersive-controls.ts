@@ -6,7 +6,8 @@ import { element, setText, shape } from "./dom";
 /** Outline of a headset on a 20 px grid. */
 const HEADSET =
   "M3.500 6.500h13a1.500 1.500 0 0 1 1.500 1.500v5a1.500 1.500 0 0 1-1.500 1.500h-3.300l-1.700-2.400" +
-  "a1.850 1.850 0 0 0-3 0l-1.700 2.400H3.500A1.500 1.500 0 0 1 2 13V8a1.500 1.500 0 0 1 1.500-1.500zM6.300 10.200h.01M13.700 10.200h.01";
+  "a1.850 1.850 0 0 0-3 0l-1.700 2.400H3.500A1.500 1.500 0 0 1 2 13V8a1.500 1.500 0 0 1 1.500-1.500z" +
+  "M6.300 10.200h.01M13.700 10.200h.01";
 
 export interface ImmersiveState {
   readonly isPresenting: boolean;

@@ -16,12 +16,10 @@ export function launchChromium(executablePath: string, ...flags: string[]): Prom
 }
 
 /**
- * Switches that save time where there is no graphics processor: SwiftShader draws only WebGL, not the page around it,
- * and no window has an address bar that is a page of its own. Only the last list of features counts, so this one
- * repeats those of Playwright's that matter to the tests.
+ * Switches that save time: no window has an address bar that is a page of its own. Only the last list of features
+ * counts, so this one repeats those of Playwright's that matter to the tests.
  */
 const LIGHT_SWITCHES = [
-  "--disable-gpu-compositing",
   "--disable-features=WebUIOmniboxPopup,WebUIOmniboxFullPopup,WebUIOmniboxAimPopup,HttpsUpgrades," +
     "HttpsFirstBalancedModeAutoEnable,MediaRouter,OptimizationHints,PaintHolding,ThirdPartyStoragePartitioning",
 ];
@@ -43,6 +41,8 @@ function launchOptions(executablePath: string, flags: readonly string[]): Launch
       "--use-gl=angle",
       "--use-angle=swiftshader",
       "--enable-unsafe-swiftshader",
+      // SwiftShader draws WebGL alone, not the page around it, as where Chromium finds no graphics processor.
+      "--disable-gpu-compositing",
       "--disable-quic",
       "--no-first-run",
       "--disable-background-networking",

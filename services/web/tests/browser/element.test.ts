@@ -75,6 +75,27 @@ describeInBrowser("embedded stage", { server: "guarded" }, (fixture) => {
     ).toBe(false);
   });
 
+  test("buttons of limbs wait for the stage, and stay in their places", async () => {
+    let want: () => void = () => undefined;
+    const isWanted = new Promise<void>((resolve) => (want = resolve));
+    const page = await open(`<bunraku-stage src="${address}" controls style="width: 300px"></bunraku-stage>`, {
+      before: (page) =>
+        page.route(/stage-chunk/, async (route) => {
+          await isWanted;
+          await route.continue();
+        }),
+    });
+    await page.waitForFunction(() => document.querySelector("bunraku-stage")?.puppeteer?.id);
+    const button = page.getByRole("button", { name: "Take the left hand" });
+    const place = await button.boundingBox();
+    expect(await button.isDisabled()).toBe(true);
+    want();
+    await waitForStages(page);
+    expect(await button.boundingBox()).toEqual(place);
+    await button.click();
+    await page.getByRole("button", { name: "Release the left hand" }).waitFor();
+  });
+
   test("attributes apply live; moving keeps and removing closes connections", async () => {
     const sockets: WebSocket[] = [];
     const before = async (page: Page) => void page.on("websocket", (socket) => sockets.push(socket));

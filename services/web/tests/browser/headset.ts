@@ -2,7 +2,7 @@
 import { fileURLToPath } from "node:url";
 import type { XRDevice } from "iwer";
 import type { Page } from "playwright-core";
-import type { Material, Mesh } from "three";
+import type { Mesh } from "three";
 import type { ImmersiveSession } from "../../src/immersive/immersive-session";
 import type { HandGrip } from "../../src/input/hand";
 import type { Position } from "./page-probe";
@@ -147,6 +147,6 @@ export function readMaterial(page: Page): Promise<{ type: string; invalidProgram
     const gl = stage.renderer.getContext();
     const programs = (stage.renderer.info.programs ?? []).map(({ program }) => program as WebGLProgram);
     const invalid = programs.filter((program) => !gl.getProgramParameter(program, gl.LINK_STATUS));
-    return { type: (figure.material as Material).type, invalidPrograms: invalid.length };
+    return { type: [figure.material].flat()[0].type, invalidPrograms: invalid.length };
   });
 }

@@ -163,6 +163,20 @@ describeInBrowser("limb control", { server: "open" }, (fixture) => {
     await waitForHold(page, RIGHT_LEG);
   });
 
+  test("a button and a key join two held hands and part them", async () => {
+    const page = await open("Aiko");
+    await stopDrawing(page);
+    await page.getByRole("button", { name: "Strings", exact: true }).click();
+    const join = page.getByRole("button", { name: "Join hands" });
+    expect(await join.isVisible()).toBe(false);
+    await tapKey(page, "Digit1");
+    await tapKey(page, "Digit2");
+    await waitForHold(page, LEFT_HAND);
+    await waitForToast(page, "The hands are joined", () => join.click());
+    await waitForToast(page, "The hands are apart again", () => page.keyboard.press("KeyJ"));
+    expect(await controlSource(page)).toBe("velocity");
+  });
+
   test("a limb is handed over on request, and the performance is recorded", async () => {
     const [aiko, mateo] = [await open("Aiko"), await open("Mateo")];
     // A puppeteer who does not answer loses the limb, so both pages must stay responsive.

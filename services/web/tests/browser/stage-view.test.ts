@@ -27,14 +27,15 @@ function countDrawnPixels(page: Page): Promise<AlphaCounts> {
     () =>
       new Promise<AlphaCounts>((resolve) => {
         const { stage } = globalThis.bunraku;
+        const { info } = stage.renderer;
         const gl = stage.renderer.getContext();
-        let { frame } = stage.renderer.info.render;
-        const read = () => {
-          // Each frame of the stage is requested before this one, so that it is drawn before it. Textures are rendered
-          // too; only a frame on the canvas leaves it up to date.
-          const hasRendered = stage.renderer.info.render.frame !== frame;
-          ({ frame } = stage.renderer.info.render);
-          if (!hasRendered || !stage.isUpToDate || gl.isContextLost()) return void requestAnimationFrame(read);
+        const draw = stage.draw.bind(stage);
+        // The browser may clear the buffer as soon as the task that has drawn it ends.
+        stage.draw = (...state) => {
+          const { frame } = info.render;
+          draw(...state);
+          if (info.render.frame === frame || gl.isContextLost()) return;
+          stage.draw = draw;
           const { drawingBufferWidth: width, drawingBufferHeight: height } = gl;
           const pixels = new Uint8Array(width * height * 4);
           gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
@@ -48,7 +49,6 @@ function countDrawnPixels(page: Page): Promise<AlphaCounts> {
           }
           resolve(counts);
         };
-        requestAnimationFrame(read);
       }),
   );
 }

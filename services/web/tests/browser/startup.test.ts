@@ -7,7 +7,19 @@ import { waitInEngine } from "./engine-probe";
 import { waitForFirstPose } from "./page-probe";
 
 /** Files that are loaded after the scripts of the stage, or after the first frame. */
-const DEFERRED_FILES = [/inter-.*\.woff2/, /marionette-/, /sound-/, /-decoder-/, /app-.*\.js/, /page-.*\.css/];
+const DEFERRED_FILES = [
+  /inter-.*\.woff2/,
+  /marionette-/,
+  /sound-/,
+  /-decoder-/,
+  /app-.*\.js/,
+  /page-.*\.css/,
+  /auto-blink-/,
+  /extension-/,
+  /\/hands-/,
+  /planted-feet-/,
+  /edge-smoothing-/,
+];
 
 /** Limit of the document and the scripts before the first frame. Each 10 kB delay it by 80 ms at 1 Mbit/s. */
 const MAX_INITIAL_GZIP_BYTES = 204_000;

@@ -30,6 +30,7 @@ let notices: string[];
 let shaken: number[];
 let shown: readonly LimbState[];
 let shownPerformer: number;
+let isReady: boolean;
 let giveKey: string | null;
 
 beforeEach(() => {
@@ -43,7 +44,7 @@ beforeEach(() => {
   control.accept();
   controller = new ClaimController(
     {
-      render: ({ limbs, performer, giveKey: key }) => ([shown, shownPerformer, giveKey] = [limbs, performer, key]),
+      render: (state) => ({ limbs: shown, performer: shownPerformer, giveKey } = state),
       toast: (message, offer) => toasts.push([message, offer]),
       notice: (text) => notices.push(text),
     },
@@ -67,10 +68,23 @@ afterEach(() => {
   FakeWebSocket.remove();
 });
 
+test("limbs can be claimed once the stage and the connection are there", () => {
+  const early = new ClaimController(
+    { render: (state) => (isReady = state.isReady), toast: () => undefined, notice: () => undefined },
+    () => DEFAULT_MAPPING,
+  );
+  early.setPlayback({ viewer, puppeteer } as unknown as Playback);
+  early.connected = true;
+  early.render();
+  expect(isReady).toBe(false);
+  early.stageInputs = { hands, velocity, shakeRing: () => undefined };
+  expect(isReady).toBe(true);
+});
+
 /** Send a presence message on both connections. */
 function sendPresence(limbs: (string | null)[], asks: string[][] = [[], [], [], []]): void {
   for (const socket of [stream, control])
-    socket.receive({ name: "Presence", live: null, viewers: 2, puppeteers: PEOPLE, limbs, asks });
+    socket.receive({ name: "Presence", live: null, bonds: null, viewers: 2, puppeteers: PEOPLE, limbs, asks });
 }
 
 describe("limb held by another user", () => {
@@ -234,5 +248,64 @@ describe("several performers", () => {
     expect([controller.isFree(SECOND), shown.length]).toEqual([false, 4]);
     showMotion("three", 3);
     expect(shown.length).toBe(12);
+  });
+});
+
+describe("joined hands", () => {
+  const sendBonds = (bonds: number[][] | null, limbs: (string | null)[]) =>
+    control.receive({
+      name: "Presence",
+      live: null,
+      bonds,
+      viewers: 1,
+      puppeteers: PEOPLE,
+      limbs,
+      asks: limbs.map(() => []),
+    });
+
+  test("a hand must be held first", () => {
+    controller.joinHands();
+    expect([toasts.at(-1)?.[0], control.messagesOf("Bond")]).toEqual(["Hold a hand, then join it with another", []]);
+  });
+
+  test("two held hands are joined, announced and parted by the same action", () => {
+    velocity.hold(LEFT_HAND);
+    velocity.hold(RIGHT_HAND);
+    controller.joinHands();
+    expect(control.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [RIGHT_HAND, LEFT_HAND], wanted: true }]);
+    sendBonds([[LEFT_HAND, RIGHT_HAND]], ["a", "a", null, null]);
+    sendBonds([[LEFT_HAND, RIGHT_HAND]], ["a", "a", null, null]);
+    expect(toasts.map(([message]) => message)).toEqual(["The hands are joined"]);
+    controller.joinHands();
+    expect(control.messagesOf("Bond").at(-1)).toEqual({ name: "Bond", limbs: [LEFT_HAND, RIGHT_HAND], wanted: false });
+  });
+
+  test("one held hand leads the free one", () => {
+    velocity.hold(LEFT_HAND);
+    controller.joinHands();
+    expect(control.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [LEFT_HAND, RIGHT_HAND], wanted: true }]);
+    sendPresence([null, "m", null, null]);
+    controller.joinHands();
+    expect(toasts.at(-1)?.[0]).toBe("These hands cannot be joined");
+  });
+
+  test.each([
+    ["apart", "The dancers are too far apart to join hands"],
+    ["released", "The hands are apart again"],
+    ["held", "These hands cannot be joined"],
+  ])("the end for the reason %s is announced", (reason, message) => {
+    control.receive({ name: "BondEnd", limbs: [0, 1], reason });
+    expect(toasts.at(-1)?.[0]).toBe(message);
+  });
+
+  test("the hand of another dancer that is opposite comes first", () => {
+    controller.selectedPerformer.count = 2;
+    sendBonds(
+      null,
+      Array.from({ length: 8 }, () => null),
+    );
+    velocity.hold(LEFT_HAND);
+    controller.joinHands();
+    expect(control.messagesOf("Bond").at(-1)?.limbs).toEqual([LEFT_HAND, 4 + RIGHT_HAND]);
   });
 });

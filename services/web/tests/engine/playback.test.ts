@@ -30,7 +30,7 @@ test("session of another server is found, opened and edited there", async () => 
   const urls = () => FakeWebSocket.opened.map(({ url }) => url);
   const playback = new Playback("on", "Aiko", () => undefined, { access });
   expect(urls()).toEqual([
-    "wss://stage.example/v1/sessions/on/stream?extensions=true",
+    "wss://stage.example/v1/sessions/on/stream?extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts",
     "wss://stage.example/v1/sessions/on/control?name=Aiko",
   ]);
   playback.edit({ playing: false });
@@ -38,7 +38,9 @@ test("session of another server is found, opened and edited there", async () => 
   playback.close();
   FakeWebSocket.opened.length = 0;
   const viewOnly = new Playback("on", "Aiko", () => undefined, { access, viewOnly: true });
-  expect(urls()).toEqual(["wss://stage.example/v1/sessions/on/stream?extensions=true"]);
+  expect(urls()).toEqual([
+    "wss://stage.example/v1/sessions/on/stream?extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts",
+  ]);
   viewOnly.close();
   FakeWebSocket.remove();
 });
@@ -63,6 +65,8 @@ test("seek by blocks moves by whole blocks within the motion", async () => {
   playback.seekByBlocks(-100, 10);
   expect(seek).toHaveBeenLastCalledWith(0, 10);
   positionAt.mockRestore();
+  // The later seeks are one request, which is not to reach the server of another test.
+  await expect.poll(() => requests.length).toBe(2);
   playback.close();
   FakeWebSocket.remove();
 });

@@ -6,6 +6,7 @@ export function recordPageActions(calls: string[]): PageActions {
     "next_dancer",
     "ask",
     "give",
+    "join",
     "play",
     "back",
     "forward",

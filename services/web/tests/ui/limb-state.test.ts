@@ -12,6 +12,7 @@ test("holders and requesters of limbs have names and colours", () => {
   const presence = {
     name: "Presence" as const,
     live: null,
+    bonds: null,
     viewers: 2,
     puppeteers: [
       { id: "a", name: "Aiko", colour: 0 },

@@ -1,7 +1,7 @@
 /** Strings panel: one row per limb with its holder, and the dock of four round buttons that replaces a closed panel. */
 import { translate, translateToParts } from "../../i18n/translator";
 import type { DigitalInput } from "../../input/digital-input";
-import { limbNumber } from "../../wire/limbs";
+import { isHand, limbNumber } from "../../wire/limbs";
 import { element, setAttribute, setText } from "../dom";
 import { limbIcon } from "../icon";
 import {
@@ -35,6 +35,8 @@ export interface StringsActions {
   ask(limb: number): void;
   withdraw(limb: number): void;
   give(limb: number): void;
+  /** Join two held hands, or part joined ones. */
+  join(): void;
   select(limb: number): void;
   focus(limb: number | null): void;
   /** Select a performer. */
@@ -147,6 +149,11 @@ export function createStringsPanel(
     { class: "text-button", type: "button", onClick: actions.keys },
     translate("Touch, gamepad and keys"),
   );
+  const join = element(
+    "button",
+    { class: "text-button join-hands", type: "button", hidden: true, onClick: actions.join },
+    translate("Join hands"),
+  );
   let loading: Promise<unknown> | null = null;
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
@@ -155,6 +162,7 @@ export function createStringsPanel(
     element("ul", { class: "limbs" }, ...rows.map(({ row }) => row)),
     hint,
     notice,
+    join,
     keys,
   );
   const dock = element(
@@ -190,6 +198,8 @@ export function createStringsPanel(
       [performer, performers] = [selected, performerCount(limbs)];
       for (const part of [chooser, next]) part.render(limbs, selected);
       for (const { limb, render } of rows) render(limbs[limbOf(limb)], ready);
+      // Only with a hand of one's own, so that the sheet of a phone leaves room for the performer's feet.
+      join.hidden = !ready || !limbs.some(({ holder }, limb) => holder?.mine && isHand(limb));
       for (const { limb, disc, name } of discs) {
         const { holder, requestedByMe } = limbs[limbOf(limb)];
         const lowerName = limbName(limbOf(limb), performers);

@@ -9,10 +9,11 @@ const QUALITY_NAMES = ["lowest detail", "low detail", "good detail", "full detai
 const HEAD_STEPS = 1000;
 const MAX_CELLS = { desktop: 68, phone: 44 };
 
-/** Element of a cell, and the quality that it shows. */
+/** Element of a cell, and what it shows. */
 interface Mark {
   readonly element: HTMLElement;
   quality: number;
+  isPlayed: boolean;
 }
 
 export interface SeekBar {
@@ -88,7 +89,7 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
 
   const markPlayed = () => {
     const fraction = length > 0 ? position / length : 0;
-    cells.forEach((cell, i) => marks[i].element.classList.toggle("played", cell.quality >= 0 && cell.start < fraction));
+    cells.forEach(({ quality, start }, i) => showPlayed(marks[i], quality >= 0 && start < fraction));
   };
   return {
     element: bar,
@@ -97,7 +98,7 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
       cells = seekCells(blocks, levelCount, innerWidth <= 720 ? MAX_CELLS.phone : MAX_CELLS.desktop);
       while (marks.length > cells.length) marks.pop()?.element.remove();
       while (marks.length < cells.length) {
-        const mark = { element: element("i"), quality: Number.NaN };
+        const mark = { element: element("i"), quality: Number.NaN, isPlayed: false };
         marks.push(mark);
         head.before(mark.element);
       }
@@ -128,6 +129,13 @@ export function createSeekBar(onSeek: (seconds: number) => void): SeekBar {
       setAttribute(bar, "aria-disabled", duration > 0 ? null : "true");
     },
   };
+}
+
+/** Show whether a cell was played. Only one cell changes at a time, or none. */
+function showPlayed(mark: Mark, isPlayed: boolean): void {
+  if (mark.isPlayed === isPlayed) return;
+  mark.isPlayed = isPlayed;
+  mark.element.classList.toggle("played", isPlayed);
 }
 
 /** Show the quality of a cell. An unchanged one is not written again: most blocks change one cell only. */

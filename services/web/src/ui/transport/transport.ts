@@ -185,8 +185,8 @@ export function createTransport(root: HTMLElement, actions: TransportActions): T
       if (camera.ariaPressed !== String(followed)) camera.ariaPressed = String(followed);
     },
     setHealth(health) {
-      dot.dataset.state = health;
-      dot.setAttribute("aria-label", translate(HEALTH_LABELS[health]));
+      setAttribute(dot, "data-state", health);
+      setAttribute(dot, "aria-label", translate(HEALTH_LABELS[health]));
     },
   };
 }
