@@ -10,11 +10,13 @@ from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import (
     ERROR_BOUNDS_MM,
     EncodedMotion,
+    EncodingGrade,
     encode_motion,
     encode_motion_to_mean_error,
     measure_level,
 )
-from bunraku.motion.skeleton import Figure, Motion, joint_and_tip_positions
+from bunraku.motion import rotation
+from bunraku.motion.skeleton import JOINT_COUNT, Figure, Motion, joint_and_tip_positions
 from tests.vectors.blocks import random_motion
 
 
@@ -93,10 +95,41 @@ def test_progress_rises_to_one() -> None:
     assert progress[-1] == 1.0
 
 
-@pytest.mark.parametrize(("bound", "grid"), [(0.2, 0), (0.5, 1), (2.0, 1), (20.0, 4)])
-def test_grid_of_the_figure_follows_the_finest_bound(bound: float, grid: int) -> None:
-    encoded = encode_motion(random_motion(0.3, 30.0, 6), error_bounds_mm=(60.0, bound), grade="live")
+@pytest.mark.parametrize(
+    ("grade", "bound", "grid"),
+    [("best", 0.2, 0), ("best", 0.5, 1), ("best", 2.0, 1), ("best", 20.0, 4), ("live", 0.5, 0)],
+)
+def test_grid_of_the_figure_follows_the_finest_bound(grade: EncodingGrade, bound: float, grid: int) -> None:
+    encoded = encode_motion(random_motion(0.3, 30.0, 6), error_bounds_mm=(60.0, bound), grade=grade)
     assert encoded.track.skeleton.grid == grid
+
+
+def still_body(frames: int, seed: int, metres: float, radians: float) -> Motion:
+    """Return a motion whose root wanders by `metres`, and whose joints tremble by `radians`, per frame."""
+    rng = np.random.default_rng(seed)
+    pose = random_motion(1.0, 60.0, seed)
+    root = pose.root[:1] + np.cumsum(rng.normal(0.0, metres, (frames, 3)), axis=0)
+    trembling = rotation.from_rotation_vector(rng.normal(0.0, radians, (frames, JOINT_COUNT, 3)))
+    return Motion(pose.figure, 60.0, root, rotation.multiply(trembling, pose.rotations[:1]))
+
+
+@pytest.mark.parametrize("grade", ["live", "best"])
+@pytest.mark.parametrize("metres", [0.0, 1e-5, 1e-3, 0.03])
+@pytest.mark.parametrize("radians", [0.0, 1e-5, 1e-4, 1e-3])
+def test_every_bound_is_met_by_a_body_that_moves_as_a_whole(
+    grade: EncodingGrade, metres: float, radians: float
+) -> None:
+    """The first fault seen was that of a live performer whose root alone moved."""
+    for seed in range(3):
+        motion = still_body(70, seed, metres, radians)
+        for level in encode_motion(motion, error_bounds_mm=(60.0, 0.5), grade=grade).ladder:
+            assert level.max_error_mm <= level.error_bound_mm
+
+
+def test_root_that_alone_moves_costs_no_bits_of_joints() -> None:
+    level = encode_motion(still_body(60, 1, 2e-3, 0.0), error_bounds_mm=(0.5,)).ladder[0]
+    moving = encode_motion(still_body(60, 1, 2e-3, 1e-2), error_bounds_mm=(0.5,)).ladder[0]
+    assert 4 * level.kbps < moving.kbps
 
 
 def test_threads_encode_the_same_bytes() -> None:

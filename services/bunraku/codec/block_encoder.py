@@ -20,7 +20,7 @@ from bunraku.codec.step_search import MAX_STEP, MIN_STEP, StepSearch
 from bunraku.kernels import load_kernels
 from bunraku.motion import rotation
 from bunraku.motion.rotation import Array
-from bunraku.motion.skeleton import JOINT_COUNT, PARENTS, TIP_JOINTS, Motion, joint_and_tip_positions
+from bunraku.motion.skeleton import CHANNEL_COUNT, JOINT_COUNT, PARENTS, TIP_JOINTS, Motion, joint_and_tip_positions
 
 EncodingGrade = Literal["live", "best"]
 """Effort of the encoder: `live` makes a single pass and accepts a step quickly, `best` refines and searches."""
@@ -38,6 +38,12 @@ _ERROR_BOUND_SWEEPS = 7
 _ERROR_BOUND_BIT_PRICE = 0.6
 _STILL_TOLERANCE = 2.0**-13
 """Difference of quaternions up to which joints have their references: that of two still frames, and of rounding."""
+_STILL_ERROR_MM = 0.25
+"""Largest displacement of a point up to which joints have their references, without an error bound."""
+_STILL_BOUND_SHARE = 0.5
+"""Share of an error bound that the displacement may have: the root needs the rest."""
+_STILL_CHANNELS = 2
+"""Channels of a body whose joints stand still: position and rotation of the root."""
 
 
 def error_bound_refinement(error_bound_mm: float) -> Refinement:
@@ -72,19 +78,16 @@ class BlockEncoder:
             orientation[joint] = rotation.multiply(orientation[parent], motion.rotations[:, joint])
         self._orientation = orientation
         # a live performer moves on the track of a motion at rest
-        self._is_still = track.is_still and np.allclose(
-            motion.rotations[:, 1:], track.reference_rotations(0)[1:], atol=_STILL_TOLERANCE
-        )
-        self._points = np.ascontiguousarray(
-            joint_and_tip_positions(motion.figure, motion.root, motion.rotations).transpose(1, 0, 2)
-        )
+        points = joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
+        self._still_error_mm = _measure_still_error(track, motion, points) if track.is_still else np.inf
+        self._points = np.ascontiguousarray(points.transpose(1, 0, 2))
 
     @cached_property
     def _costs(self) -> Array:
         table: Array = load_kernels("codec").build_cost_table(self._prior)
         return table
 
-    def _block_input(self, index: int, step: int, heading: int) -> BlockInput:
+    def _block_input(self, index: int, step: int, heading: int, channels: int) -> BlockInput:
         track = self._track
         start, frames = track.first_frame(index), track.frames_in(index)
         part = slice(start, start + frames)
@@ -102,17 +105,25 @@ class BlockEncoder:
             ),
             Quantiser(basis, step, step_size(step, frames)),
             coefficients.duration_level(frames, track.fps),
+            channels,
             np.ascontiguousarray(self._orientation[:, part]),
             np.ascontiguousarray(self._points[:, part]),
         )
 
-    def encode_block(self, index: int, step: int, refinement: Refinement | None = None) -> EncodedBlock:
-        """Encode block `index` at one step index, in a single pass or with a second pass that refines it."""
+    def encode_block(
+        self, index: int, step: int, refinement: Refinement | None = None, still_error_mm: float = _STILL_ERROR_MM
+    ) -> EncodedBlock:
+        """Encode block `index` at one step index, in a single pass or with a second pass that refines it.
+
+        Joints that stand still have no coefficients if their references displace no point by more than
+        `still_error_mm`: joints that correct the root's error cost more than they gain.
+        """
         kernels = load_kernels("codec")
         track = self._track
         start, frames = track.first_frame(index), track.frames_in(index)
         heading = track.nearest_heading(self._root[start + frames // 2])
-        block = self._block_input(index, step, heading)
+        channels = _STILL_CHANNELS if self._still_error_mm <= still_error_mm else CHANNEL_COUNT
+        block = self._block_input(index, step, heading, channels)
         q: IntArray = np.zeros((19, 3, frames), dtype=np.int64)
         decoded = kernels.quantise_closed_loop(block, q)
         if refinement is not None:
@@ -120,10 +131,6 @@ class BlockEncoder:
                 decoded = kernels.refine_within_bound(block, q, refinement)
             else:
                 decoded = kernels.refine_coefficients(block, q, refinement)
-        if self._is_still:
-            # the joints' references are the pose itself: joints that correct the root's error cost more than they gain
-            q[2:] = 0
-            decoded = kernels.compute_points(block.chain, block.quantiser, q)
         header = BlockHeader(frames, step, heading)
         encode = partial(coefficients.encode_coefficients, self._prior, header, q, track.block_frames, track.fps)
         return EncodedBlock(step, np.linalg.norm(decoded - block.points, axis=-1) * 1e3, encode)
@@ -133,16 +140,19 @@ class BlockEncoder:
     ) -> EncodedBlock:
         """Encode block `index` with no point more than `error_bound_mm` off, at the cheapest step found.
 
-        The search starts at `initial_step`, if given. Raises ValueError if the finest step does not meet the bound.
+        The search starts at `initial_step`, if given. The `live` grade refines only a block that a single pass does not
+        bring within the bound at any step. Raises ValueError if the finest step does not meet the bound.
         """
-        refinement = None if grade == "live" else error_bound_refinement(error_bound_mm)
-        search = StepSearch(partial(self.encode_block, index, refinement=refinement), error_bound_mm)
         step = (
             initial_step
             if initial_step is not None
             else int(np.clip(16 * np.log2(error_bound_mm * 2e-4 / 2.0**-16), MIN_STEP, MAX_STEP))
         )
-        found = search.find_valid(step) if grade == "live" else search.find_cheapest(step)
+        encode = partial(self.encode_block, index, still_error_mm=_STILL_BOUND_SHARE * error_bound_mm)
+        found = StepSearch(encode, error_bound_mm).find_valid(step) if grade == "live" else None
+        if found is None:
+            refined = partial(encode, refinement=error_bound_refinement(error_bound_mm))
+            found = StepSearch(refined, error_bound_mm).find_cheapest(step)
         if found is None:
             raise ValueError(f"Block {index} cannot be encoded within {error_bound_mm} mm, even at the finest step.")
         return found
@@ -193,3 +203,13 @@ class BlockEncoder:
             guess = step + int(np.clip(np.round(19 * np.log2(error_budget / max(error, 1e-9))), -64, 64))
             step = min(max(guess, low + 1), high - 1)
         return low if total_error(low) <= error_budget else None
+
+
+def _measure_still_error(track: MotionTrack, motion: Motion, points: Array) -> float:
+    """Return how far the references displace a point of a motion (n, 23, 3), in mm; infinity if joints turn."""
+    references = np.broadcast_to(track.reference_rotations(0), motion.rotations.shape).copy()
+    if not np.allclose(motion.rotations[:, 1:], references[:, 1:], atol=_STILL_TOLERANCE):
+        return np.inf
+    references[:, 0] = motion.rotations[:, 0]
+    still = joint_and_tip_positions(motion.figure, motion.root, references)
+    return float(np.linalg.norm(still - points, axis=-1).max() * 1e3)

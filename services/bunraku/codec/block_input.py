@@ -32,10 +32,11 @@ class Quantiser(NamedTuple):
 
 
 class BlockInput(NamedTuple):
-    """One block to encode, the same for both passes of the encoder.
+    """One block to encode, the same for all passes of the encoder.
 
-    `costs` is `build_cost_table(prior)`, `duration_level` a feature of the context model. The source motion is given
-    in the world frame: `orientation` (18, n, 4) of the joints, and `points` (23, n, 3), joints first, then tips.
+    `costs` is `build_cost_table(prior)`, `duration_level` a feature of the context model. The coefficients of channels
+    from number `channels` on are zero. The source motion is given in the world frame: `orientation` (18, n, 4) of the
+    joints, and `points` (23, n, 3), joints first, then tips.
     """
 
     prior: Prior
@@ -44,6 +45,7 @@ class BlockInput(NamedTuple):
     chain: KinematicChain
     quantiser: Quantiser
     duration_level: int
+    channels: int
     orientation: Array
     points: Array
 

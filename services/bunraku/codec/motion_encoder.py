@@ -28,7 +28,10 @@ They range from about 1 kbit/s to a quality that is indistinguishable from the s
 _MEAN_TO_MAX_ERROR_RATIO = 0.3
 """Typical mean error as a share of the largest."""
 _GRID_ERROR_MM = 0.5
-"""Largest error below which the grid of the figure gets finer: at this bound, 0.2 mm costs less than 0.1 mm."""
+"""Largest error below which the grid of the figure gets finer: at this bound, 0.2 mm costs less than 0.1 mm.
+
+Only refined blocks correct errors of so coarse a grid.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +104,9 @@ def encode_motion(
         ValueError: The finest step does not meet a bound.
     """
     finest = min(error_bounds_mm)
-    grid_error_mm = max(finest * _MEAN_TO_MAX_ERROR_RATIO, min(finest, _GRID_ERROR_MM))
+    grid_error_mm = finest * _MEAN_TO_MAX_ERROR_RATIO
+    if grade == "best":
+        grid_error_mm = max(grid_error_mm, min(finest, _GRID_ERROR_MM))
     track = plan_motion_track(motion, block_seconds, first_seconds, grid_error_mm)
     encoder = BlockEncoder(track, motion, prior or load_shipped_prior())
     finished = count(1)

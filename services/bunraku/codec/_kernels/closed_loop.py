@@ -158,7 +158,8 @@ def quantise_closed_loop(block: BlockInput, q: IntArray) -> Array:
                     v[x] += v[x] / angle * turns
             previous[:] = v
             apply_matrix(chain.weight[joint + 1], v, weighted[t])
-        _quantise_channel(block, context, q, joint + 1, weighted)
+        if joint + 1 < block.channels:
+            _quantise_channel(block, context, q, joint + 1, weighted)
         compute_orientation(chain, joint, evaluate_channel(chain, quantiser, q, joint + 1), pose)
         place_child_points(chain, joint, pose)
     return points

@@ -203,7 +203,7 @@ def _sweep_block(
     context, chain = sweep.context, sweep.block.chain
     axes, every_point = np.zeros((pose.points.shape[1], 3)), np.arange(POINT_COUNT)
     added_bits = 0.0
-    for channel in range(19):
+    for channel in range(sweep.block.channels):
         start_channel(sweep, channel)
         for axis in range(3):
             if channel == 0:

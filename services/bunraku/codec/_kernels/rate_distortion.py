@@ -355,7 +355,7 @@ def refine_coefficients(block: BlockInput, q: IntArray, refinement: Refinement) 
                 return pose.points
             _update_weights(error, number >= _MIN_SWEEPS)
         sweep = start_sweep(block, q, refinement.bit_price)
-        for channel in range(19):
+        for channel in range(block.channels):
             _sweep_channel(sweep, q, channel, pose, error, slope)
     compute_pose(block.chain, block.quantiser, q, pose)
     return pose.points
