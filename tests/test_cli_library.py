@@ -52,6 +52,24 @@ def test_edit_creates_a_motion(server: str, motion: str) -> None:
     assert shown.stdout.startswith("1.00 s, Left: ")
 
 
+def test_motions_are_encoded_again(server: str, motion: str) -> None:
+    (result,) = run_json("reencode", f"{server}/v1/motions/{motion}")
+    assert result["id"] == motion
+    assert result["after"][-1] == result["before"][-1]
+    shown = RUN.invoke(app, ["reencode", motion, "--server", server])
+    assert shown.exit_code == 0, shown.output
+    assert shown.stdout.startswith("1 of 1, Heron: ")
+    assert "kbit/s" in shown.stdout
+    missing = RUN.invoke(app, ["reencode", "ZZ", "--server", server])
+    assert missing.exit_code == 1
+    assert "No such motion" in missing.output
+
+
+def test_reencode_needs_motions_of_one_server_or_all(server: str) -> None:
+    for arguments in ([], ["ZZ", "--all"], [f"{server}/v1/motions/a", "http://other/v1/motions/b"]):
+        assert RUN.invoke(app, ["reencode", *arguments]).exit_code == 2
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

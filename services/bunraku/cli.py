@@ -25,7 +25,7 @@ from bunraku.cli_access import (
 from bunraku.cli_bench import bench
 from bunraku.cli_capture import capture
 from bunraku.cli_inspect import inspect
-from bunraku.cli_library import edit, list_motions, rename, tag
+from bunraku.cli_library import edit, list_motions, reencode, rename, tag
 from bunraku.cli_send import send
 from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
@@ -60,6 +60,7 @@ app.command(name="list")(list_motions)
 app.command()(rename)
 app.command()(tag)
 app.command()(edit)
+app.command()(reencode)
 app.add_typer(bench, name="bench")
 app.add_typer(capture, name="capture")
 app.add_typer(send, name="send")

@@ -1,4 +1,4 @@
-"""Commands for the motions of a server: `bunraku list`, `rename`, `tag` and `edit`."""
+"""Commands for the motions of a server: `bunraku list`, `rename`, `tag`, `edit` and `reencode`."""
 
 from __future__ import annotations
 
@@ -113,6 +113,56 @@ def edit(
         out.print_json(data=created)
         return
     print_plain(f"{created['duration']:.2f} s, {created['name']}: {created['id']}")
+
+
+def reencode(
+    motions: Annotated[list[str] | None, typer.Argument(help="Ids or addresses of motions.")] = None,
+    all_motions: Annotated[bool, typer.Option("--all", help="All motions of the server.")] = False,
+    server: ServerOption = DEFAULT_SERVER,
+    token: TokenOption = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Encode motions of an older release again, in place: their lower bitrate levels get smaller."""
+    from bunraku.client.api import Client
+    from bunraku.client.server_problem import ServerProblem
+
+    if bool(motions) == all_motions:
+        raise typer.BadParameter("give motions, or --all for every motion of the server")
+    addresses = [parse_motion_address(motion) for motion in motions or []]
+    bases = {base or server for base, _ in addresses} or {server}
+    if len(bases) > 1:
+        raise typer.BadParameter("give motions of one server at a time")
+    (base,) = bases
+
+    async def reencode_one(client: Client, before: dict[str, Any]) -> dict[str, Any]:
+        result = {"id": before["id"], "name": before["name"], "before": before["rates"]}
+        try:
+            return result | {"after": (await client.reencode_motion(before["id"]))["rates"]}
+        except ServerProblem as problem:
+            return result | {"problem": str(problem)}
+
+    async def request() -> list[dict[str, Any]]:
+        results = []
+        async with Client(base, token) as client:
+            entries = [await client.motion(motion_id) for _, motion_id in addresses] or await client.motions()
+            for number, before in enumerate(entries, 1):
+                results.append(await reencode_one(client, before))
+                if not as_json:
+                    print_plain(f"{number} of {len(entries)}, {_describe_reencoding(results[-1])}")
+        return results
+
+    results = run_request(request, base)
+    if as_json:
+        out.print_json(data=results)
+    if any("problem" in result for result in results):
+        raise typer.Exit(1)
+
+
+def _describe_reencoding(result: dict[str, Any]) -> str:
+    if "problem" in result:
+        return f"{result['name']}: {result['problem']}"
+    before, after = (" ".join(f"{rate['kbps']:.2f}" for rate in result[key]) for key in ("before", "after"))
+    return f"{result['name']}: {before} kbit/s" + (f" -> {after} kbit/s" if after != before else ", as before")
 
 
 def _request(

@@ -3,6 +3,7 @@ from __future__ import annotations
 import asyncio
 import base64
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -173,6 +174,14 @@ async def test_edit_changes_the_description_and_is_found(catalogue: SqlCatalogue
     with pytest.raises(ProblemError, match="no"):
         await catalogue.edit_motion("m1", reject)
     assert await catalogue.get_motion("m1") == edited
+
+
+async def test_size_of_a_replaced_object_is_stored(catalogue: SqlCatalogue) -> None:
+    entry = CatalogueEntry("m1", 5, {"name": "x"}, "Aiko", 7)
+    await catalogue.add_motion(entry)
+    resized = await catalogue.edit_motion("m1", lambda one: one.description, object_bytes=3)
+    assert resized == await catalogue.get_motion("m1") == replace(entry, bytes=3)
+    assert await catalogue.edit_motion("m1", lambda one: one.description) == resized
 
 
 async def test_concurrent_edits_are_all_applied(catalogue: SqlCatalogue) -> None:

@@ -65,6 +65,22 @@ async def test_motions_without_complete_objects_are_hidden(stored: Stored, caplo
     await stored.catalogue.close()
 
 
+async def test_object_that_is_replaced_during_the_check_hides_nothing(
+    stored: Stored, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    await stored.add("m1")
+    object_sizes = stored.motion_store.object_sizes
+
+    async def replace_first(motion_ids: list[str]) -> list[int | None]:
+        await stored.catalogue.edit_motion("m1", lambda one: one.description, object_bytes=0)
+        await stored.motion_store.put("m1", b"less")
+        return await object_sizes(motion_ids)
+
+    monkeypatch.setattr(stored.motion_store, "object_sizes", replace_first)
+    assert await stored.check() == 0
+    await stored.catalogue.close()
+
+
 async def test_restored_object_makes_its_motion_visible_again(stored: Stored) -> None:
     await stored.add("m1")
     stored.path("m1").unlink()

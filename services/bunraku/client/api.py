@@ -137,6 +137,10 @@ class Client:
                 "POST", f"/v1/motions/{quote(motion, safe='')}/edits", params={"upload": upload}, json=body
             )
 
+    async def reencode_motion(self, motion: str) -> dict[str, Any]:
+        """Encode a motion of an older release again, in place, and return it: its lower bitrate levels get smaller."""
+        return await self._request("POST", f"/v1/motions/{quote(motion, safe='')}/encodings")
+
     async def motions(self, search: str = "", tag: str = "") -> list[dict[str, Any]]:
         """Return all motions, newest first: those whose name has every word of `search`, and that have the tag `tag`.
 

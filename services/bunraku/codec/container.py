@@ -16,7 +16,7 @@ from bunraku.codec.audio import AudioTrack, EncodedAudio, parse_audio_track
 from bunraku.codec.extension.contact import ContactTrack, EncodedContacts, parse_contact_track
 from bunraku.codec.extension.encoder import EncodedExtension
 from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, ExtensionTrack, parse_extension_track
-from bunraku.codec.motion_encoder import EncodedMotion
+from bunraku.codec.motion_encoder import BitrateLevel, EncodedMotion
 from bunraku.codec.motion_track import MotionTrack, parse_motion_track
 from bunraku.codec.scene import SceneTrack, parse_scene_track
 from bunraku.codec.scene_encoder import EncodedScene
@@ -180,6 +180,26 @@ def add_performers(
     ]
     staging = [track for track in own if track.type not in ("motion", EXTENSION_TYPE)]
     return _pack_object(motion_id, [*placed, *staging, *_joined_extensions([stored, *others])])
+
+
+def stored_ladders(stored: StoredMotion) -> list[list[BitrateLevel]]:
+    """Return the bitrate levels of each performer, with the figures that the Description gives."""
+    return [
+        [
+            BitrateLevel(blocks, rate["kbps"], rate["mean"], rate["max"], rate["max"])
+            for blocks, rate in zip(track.blocks, track.description["rates"], strict=True)
+        ]
+        for track in _stored_tracks(stored)[: len(stored.performers)]
+    ]
+
+
+def replace_ladders(stored: StoredMotion, ladders: Sequence[Sequence[BitrateLevel]]) -> bytes:
+    """Return the object of `stored` with other bitrate levels of its performers."""
+    tracks = _stored_tracks(stored)
+    for number, ladder in enumerate(ladders):
+        rates = [level.describe() for level in ladder]
+        tracks[number] = _new_track(tracks[number].description | {"rates": rates}, ladder)
+    return _pack_object(stored.id, tracks)[0]
 
 
 def unpack_motion(motion_id: str, packed: bytes) -> StoredMotion:

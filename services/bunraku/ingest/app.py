@@ -32,6 +32,7 @@ from bunraku.ingest.performers import PerformersOperation, PerformersRequest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
 from bunraku.ingest.recording import RecordingOperation
+from bunraku.ingest.reencoding import ReencodingOperation
 from bunraku.ingest.scene import SceneOperation
 from bunraku.ingest.takes import TakesOperation, create_takes_job
 from bunraku.ingest.thumbnail import CONTENT_SECURITY_POLICY, Thumbnails
@@ -65,6 +66,7 @@ def create_app(context: ServiceContext) -> FastAPI:
     performances = PerformanceOperation(context, worker_slots)
     takes_operation = TakesOperation(context, worker_slots, motions)
     edits = EditOperation(context, worker_slots)
+    reencodings = ReencodingOperation(context, worker_slots)
     thumbnails = Thumbnails(context)
     handlers = {
         "motion": motions.run_job,
@@ -184,6 +186,21 @@ def create_app(context: ServiceContext) -> FastAPI:
         return _stored_response(
             await uploads.run(request, upload, job, body.model_dump_json().encode(), job_queue.run_job)
         )
+
+    @app.post("/v1/motions/{motion}/encodings", tags=["motions"])
+    @requires(Role.INGEST)
+    async def reencode(motion: str, request: Request) -> dict[str, Any]:
+        """Encode the bitrate levels of a motion again, in place, where they get smaller with the same largest error.
+
+        This shrinks motions that an older release stored; id, name, links and highest level stay. Without the role
+        admin, only motions of one's subject.
+        """
+        access = access_of(request)
+        entry = await context.catalogue.get_motion(motion)
+        if entry is None:
+            raise motion_not_found(motion)
+        require_ownership(access, entry, "encoding")
+        return entry_json(await run_until_disconnect(request, reencodings.reencode(motion, access.subject)))
 
     @app.get("/v1/uploads/{upload}", tags=["motions"])
     @requires(Role.INGEST)

@@ -28,6 +28,7 @@ class JobKind(StrEnum):
     PERFORMERS = "gather"
     PERFORMANCE = "perform"
     EDIT = "edit"
+    REENCODING = "reencode"
 
 
 worker_process.preload_modules(
@@ -38,6 +39,7 @@ worker_process.preload_modules(
     "bunraku.ingest.jobs.performers",
     "bunraku.ingest.jobs.performance",
     "bunraku.ingest.jobs.edit",
+    "bunraku.ingest.jobs.reencoding",
 )
 
 
@@ -99,6 +101,13 @@ _FAILURE_TEXTS: dict[JobKind, _FailureTexts] = {
         "cut out a shorter part",
         "Unreadable motion",
         "editing this motion crashed",
+        "please report it",
+    ),
+    JobKind.REENCODING: _FailureTexts(
+        "Too much motion",
+        "leave it as it is stored",
+        "Unreadable motion",
+        "encoding this motion again crashed",
         "please report it",
     ),
 }
@@ -167,6 +176,7 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
     from bunraku.ingest.jobs.performance import encode_performance
     from bunraku.ingest.jobs.performers import combine_performers
     from bunraku.ingest.jobs.recording import encode_recording
+    from bunraku.ingest.jobs.reencoding import reencode_motion
     from bunraku.ingest.jobs.scene import add_scene_of_body
 
     functions: dict[JobKind, Callable[..., JobResult | JobRejection]] = {
@@ -177,5 +187,6 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
         JobKind.PERFORMERS: combine_performers,
         JobKind.PERFORMANCE: encode_performance,
         JobKind.EDIT: edit_motion,
+        JobKind.REENCODING: reencode_motion,
     }
     return functions[kind](*arguments)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from bunraku.http.problem_details import motion_not_found
 from bunraku.ingest.result import JobResult
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.problem import ProblemError
@@ -58,6 +60,26 @@ async def store_motion(
         await context.motion_store.put(motion_id, result.packed)
     # an existing entry, or the labels of an incomplete one
     return StoreOutcome(await context.catalogue.get_motion(motion_id) or entry, is_new)
+
+
+async def replace_motion(
+    context: ServiceContext, motion_id: str, packed: bytes, describe: Callable[[dict[str, Any]], dict[str, Any]]
+) -> CatalogueEntry:
+    """Replace the object of a motion, and its description by what `describe` returns; return the new entry.
+
+    Whatever is interrupted, the motion stays complete. Raise `ProblemError` (404), with nothing stored, if it was
+    removed.
+    """
+    catalogue, store = context.catalogue, context.motion_store
+    # of an object with an unknown size nobody thinks that it is truncated
+    if await catalogue.edit_motion(motion_id, lambda entry: entry.description, object_bytes=0) is None:
+        raise motion_not_found(motion_id)
+    await store.put(motion_id, packed)
+    entry = await catalogue.edit_motion(motion_id, lambda entry: describe(entry.description), object_bytes=len(packed))
+    if entry is None:
+        await store.remove(motion_id)
+        raise motion_not_found(motion_id)
+    return entry
 
 
 def _quota_problem(error: QuotaExceeded) -> ProblemError:

@@ -79,14 +79,17 @@ class Catalogue:
         entries, following = await (await self.open()).list_motions(limit, cursor, condition or MotionFilter())
         return [entry for entry in entries if not self._is_incomplete(entry)], following
 
-    async def edit_motion(self, motion_id: str, edit: DescriptionEdit) -> CatalogueEntry | None:
+    async def edit_motion(
+        self, motion_id: str, edit: DescriptionEdit, object_bytes: int | None = None
+    ) -> CatalogueEntry | None:
         """Replace the description of a motion by what `edit` returns for its entry; return the new entry.
 
-        Return None if the motion does not exist or is incomplete. Concurrent edits follow one another.
+        `object_bytes` is the new size of its object, 0 while that is unknown; None keeps it. Return None if the motion
+        does not exist or is incomplete. Concurrent edits follow one another.
         """
         if await self.get_motion(motion_id) is None:
             return None
-        return await (await self.open()).edit_motion(motion_id, edit)
+        return await (await self.open()).edit_motion(motion_id, edit, object_bytes)
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""

@@ -138,12 +138,16 @@ class SqlCatalogue:
                 pass
         return await self._run_query(self._select_motions(limit, after, condition))
 
-    async def edit_motion(self, motion_id: str, edit: DescriptionEdit) -> CatalogueEntry | None:
-        """Replace the description of a motion and return its entry, None if it does not exist.
+    async def edit_motion(
+        self, motion_id: str, edit: DescriptionEdit, object_bytes: int | None = None
+    ) -> CatalogueEntry | None:
+        """Replace the description of a motion, and the size of its object, and return its entry.
 
-        Concurrent edits follow one another: none is lost.
+        Return None if it does not exist. Concurrent edits follow one another: none is lost.
         """
-        return await self._run_query(self._update_description(motion_id, edit)) if is_motion_id(motion_id) else None
+        if not is_motion_id(motion_id):
+            return None
+        return await self._run_query(self._update_description(motion_id, edit, object_bytes))
 
     async def remove_motion(self, motion_id: str) -> bool:
         """Remove a motion and return whether it existed."""
@@ -192,20 +196,28 @@ class SqlCatalogue:
             row = (await connection.execute(select(MOTIONS).where(MOTIONS.c.id == motion_id))).first()
         return _entry_from_row(row) if row is not None else None
 
-    async def _update_description(self, motion_id: str, edit: DescriptionEdit) -> CatalogueEntry | None:
+    async def _update_description(
+        self, motion_id: str, edit: DescriptionEdit, object_bytes: int | None
+    ) -> CatalogueEntry | None:
         while True:
             async with self._engine.begin() as connection:
                 row = (await connection.execute(select(MOTIONS).where(MOTIONS.c.id == motion_id))).first()
                 if row is None:
                     return None
                 entry = _entry_from_row(row)
-                description = edit(entry)
+                edited = replace(entry, description=edit(entry))
                 # only if the row is unchanged: the same statement works in both databases, without a lock
                 unchanged = (MOTIONS.c.id == motion_id, MOTIONS.c.description == row.description)
                 statement = update(MOTIONS).where(*unchanged, MOTIONS.c.created == row.created)
-                values = {"description": json.dumps(description), **search_columns(description)}
+                values: dict[str, Any] = {
+                    "description": json.dumps(edited.description),
+                    **search_columns(edited.description),
+                }
+                if object_bytes is not None:
+                    edited = replace(edited, bytes=object_bytes)
+                    values["bytes"] = object_bytes
                 if (await connection.execute(statement.values(values))).rowcount:
-                    return replace(entry, description=description)
+                    return edited
 
     async def _fill_search_columns(self) -> bool:
         """Fill the search columns of rows that a replica of an older release added; return whether more may follow."""

@@ -39,7 +39,7 @@ async def hide_incomplete_motions(catalogue: Catalogue, motion_store: MotionStor
     while rows := await catalogue.list_motion_keys(PAGE_SIZE, after):
         after = rows[-1].id
         for row, size in zip(rows, await motion_store.object_sizes([row.id for row in rows]), strict=True):
-            if size is not None and (not row.bytes or size == row.bytes):
+            if size is not None and (not row.bytes or size == row.bytes or await _is_replaced(catalogue, row)):
                 continue
             incomplete.append(row)
             if len(incomplete) <= MAX_LOGGED_MOTIONS:
@@ -79,6 +79,12 @@ async def sweep_objects(catalogue: Catalogue, motion_store: MotionStore, created
     if removed:
         _log.warning("Removed %d stored objects that ended processes left behind", removed)
     return removed
+
+
+async def _is_replaced(catalogue: Catalogue, row: MotionKey) -> bool:
+    """Return whether the object of a motion has been replaced since its row was read."""
+    entry = await catalogue.get_motion(row.id)
+    return entry is not None and entry.bytes != row.bytes
 
 
 async def _find_orphans(objects: list[StoredObject], find_used: UsedObjectFinder) -> list[StoredObject]:

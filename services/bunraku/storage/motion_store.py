@@ -1,4 +1,4 @@
-"""Store of encoded motions: immutable objects in a folder or an object store.
+"""Store of encoded motions: objects in a folder or an object store, which change only when they are encoded again.
 
 The store also holds the uploaded files and session logs of pending jobs, the samples of live performances, and notes
 that replicas share.
@@ -55,8 +55,9 @@ class MotionStore:
         return cls(ObjectStorage(url))
 
     async def put(self, motion_id: str, packed: bytes) -> None:
-        """Store a motion, packed by `pack_motion`."""
+        """Store a motion, packed by `pack_motion`. Who has loaded a former object of this id keeps it."""
         await self._objects.put(_motion_path(motion_id), packed)
+        self._forget(motion_id)
 
     async def get(self, motion_id: str) -> StoredMotion | None:
         """Return a motion, None if it does not exist, is damaged or is in an unsupported codec."""
@@ -90,9 +91,7 @@ class MotionStore:
 
     async def remove(self, motion_id: str) -> None:
         """Remove a motion if it exists."""
-        self._loaded.pop(motion_id, None)
-        if motion_id in self._cache:
-            self._drop(motion_id)
+        self._forget(motion_id)
         await self._objects.delete(_motion_path(motion_id))
 
     async def check(self) -> None:
@@ -158,6 +157,11 @@ class MotionStore:
             if self._cached_bytes <= MAX_CACHE_BYTES and requested_at >= now - MAX_CACHE_IDLE_US:
                 break
             self._drop(oldest)
+
+    def _forget(self, motion_id: str) -> None:
+        self._loaded.pop(motion_id, None)
+        if motion_id in self._cache:
+            self._drop(motion_id)
 
     def _drop(self, motion_id: str) -> None:
         dropped, _ = self._cache.pop(motion_id)

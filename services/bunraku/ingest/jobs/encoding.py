@@ -22,10 +22,14 @@ MAX_BEST_GRADE_FRAMES = 6_000
 """Longer motions are encoded in one pass: the second pass saves a few per cent and would take minutes."""
 
 
+def affordable_grade(frame_count: int) -> EncodingGrade:
+    """Return the effort of a job that encodes `frame_count` frames in all."""
+    return "best" if frame_count <= MAX_BEST_GRADE_FRAMES else "live"
+
+
 def encode_motions(motions: Sequence[Motion], on_progress: Callable[[float], None]) -> Iterator[EncodedMotion]:
     """Yield the encoded motions in order; `on_progress` receives the share of all that is encoded, 0..1."""
-    frame_count = sum(motion.frame_count for motion in motions)
-    grade: EncodingGrade = "best" if frame_count <= MAX_BEST_GRADE_FRAMES else "live"
+    grade = affordable_grade(sum(motion.frame_count for motion in motions))
     progress_lock, finished = Lock(), 0
 
     def report_progress(share: float) -> None:
