@@ -2,7 +2,8 @@
  * Smoothing of edges in a part of the picture, where the context has no antialiasing of its own: without a graphics
  * processor, multisampling the whole picture takes two and a half times as long (`proto/NOTES.md`, "Page").
  *
- * After FXAA (T. Lottes, NVIDIA, 2009): where the luma of neighbours differs, mix colours along the edge.
+ * After FXAA (T. Lottes, NVIDIA, 2009): where the luma of neighbours differs, mix colours along the edge. What a coarse
+ * picture loses, it gets back by sharpening: elsewhere fully, and less where that would bring the stairs back.
  */
 import {
   BufferAttribute,
@@ -27,14 +28,15 @@ void main() {
   vec2 at = gl_FragCoord.xy * texel;
   // Single texels: interpolated ones take several times as long without a graphics processor.
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  float leftUp = luma(texelFetch(picture, pixel + ivec2(-1, 1), 0));
-  float rightUp = luma(texelFetch(picture, pixel + 1, 0));
-  float leftDown = luma(texelFetch(picture, pixel - 1, 0));
-  float rightDown = luma(texelFetch(picture, pixel + ivec2(1, -1), 0));
-  float centre = luma(texelFetch(picture, pixel, 0));
+  vec4 leftUpColour = texelFetch(picture, pixel + ivec2(-1, 1), 0), rightUpColour = texelFetch(picture, pixel + 1, 0);
+  vec4 leftDownColour = texelFetch(picture, pixel - 1, 0), rightDownColour = texelFetch(picture, pixel + ivec2(1, -1), 0);
+  vec4 colour = texelFetch(picture, pixel, 0);
+  float leftUp = luma(leftUpColour), rightUp = luma(rightUpColour);
+  float leftDown = luma(leftDownColour), rightDown = luma(rightDownColour);
+  float centre = luma(colour);
   float low = min(centre, min(min(leftUp, rightUp), min(leftDown, rightDown)));
   float high = max(centre, max(max(leftUp, rightUp), max(leftDown, rightDown)));
-  if (high - low < max(.04, .125 * high)) discard;
+  vec4 lost = .5 * (colour - .25 * (leftUpColour + rightUpColour + leftDownColour + rightDownColour));
   // Along the edge: across the gradient of the luma.
   vec2 along = vec2(leftDown + rightDown - leftUp - rightUp, leftUp + leftDown - rightUp - rightDown);
   float flatness = max((leftUp + rightUp + leftDown + rightDown) * .03, .008);
@@ -42,7 +44,8 @@ void main() {
   vec4 near = .5 * (texture2D(picture, at - along / 6.) + texture2D(picture, at + along / 6.));
   vec4 far = .5 * near + .25 * (texture2D(picture, at - .5 * along) + texture2D(picture, at + .5 * along));
   float reached = luma(far);
-  gl_FragColor = reached < low || reached > high ? near : far;
+  bool isEdge = high - low > max(.04, .125 * high);
+  gl_FragColor = isEdge ? (reached < low || reached > high ? near : far) + .4 * lost : colour + lost;
 }`;
 
 /** Distance to the pixels that a smoothed one is mixed of, in pixels. */

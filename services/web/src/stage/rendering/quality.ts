@@ -49,7 +49,10 @@ const CLEAN_TARGET_S = 1 / 25;
 const SLOWEST_DISPLAY_S = 1 / 30;
 /** The quality is reduced if the median frame takes longer than this multiple of the target. */
 const SLOW = 1.25;
-/** The quality may rise if the median frame takes less than this multiple of the target. */
+/**
+ * The quality may rise if the median frame takes less than this multiple of the target. Below the clean picture, that of
+ * a frame which is not slow suffices: only the trial shows if the machine was slow for a while.
+ */
 const FAST = 1.11;
 /** Frames per median; few, since slow frames are also rare. */
 const WINDOW_FRAMES = 6;
@@ -128,7 +131,9 @@ export class AdaptiveQuality {
     const median = seconds < VERY_SLOW_FRAME_S ? sorted[WINDOW_FRAMES >> 1] : seconds;
     const targetS = this.#targetS(this.#level, displayS);
     if (median > SLOW * targetS) return this.#reduce(median / targetS);
-    if (median < FAST * this.#targetS(Math.max(0, this.#level - 1), displayS)) this.#fastS += windowS;
+    const isCoarse = this.#isSoftware && this.quality.pixelRatioScale < CLEAN_SCALE;
+    const fast = isCoarse ? SLOW : FAST;
+    if (median < fast * this.#targetS(Math.max(0, this.#level - 1), displayS)) this.#fastS += windowS;
     return this.#raise();
   }
 

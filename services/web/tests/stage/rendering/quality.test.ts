@@ -107,8 +107,21 @@ test("in software the picture stays clean at 20 frames a second, and becomes cle
   expect(choice.quality.pixelRatioScale).toBe(0.75);
   for (let i = 0; i < 100; i++) choice.addFrameTime(1 / 15);
   expect(choice.quality.pixelRatioScale).toBe(0.6);
-  for (let i = 0; i < 1000; i++) choice.addFrameTime(1 / 24);
+  for (let i = 0; i < 1000; i++) choice.addFrameTime(1 / 20.5);
   expect(choice.quality.pixelRatioScale).toBe(0.75);
+});
+
+test("in software a machine on which only the coarse picture reaches 20 frames a second shows that one", () => {
+  const choice = new AdaptiveQuality(SOFTWARE, false);
+  const shown = new Map<number, number>();
+  for (let i = 0; i < 5000; i++) {
+    const { pixelRatioScale } = choice.quality;
+    const seconds = pixelRatioScale > 0.6 ? 1 / 18 : 1 / 21;
+    shown.set(pixelRatioScale, (shown.get(pixelRatioScale) ?? 0) + seconds);
+    choice.addFrameTime(seconds);
+  }
+  const total = [...shown.values()].reduce((sum, seconds) => sum + seconds);
+  expect(shown.get(0.6)! / total).toBeGreaterThan(0.95);
 });
 
 test("a single stutter and a page in the background do not count", () => {
