@@ -8,7 +8,7 @@ import { type ExtensionPart, ExtensionTrack } from "../codec/extension/track";
 import { MotionTrack } from "../codec/motion-track";
 import { parseLadder, parseTiming, type Timing } from "../codec/timing";
 import { MotionBlockStore, type TrackBlockStore } from "../playout/block-store";
-import { ExtensionBlockStore } from "../playout/extension-poses";
+import { ExtensionBlockStore } from "../playout/extension-values";
 import { unpackServerMessage } from "../wire/client-codec";
 import { MalformedMessage } from "../wire/errors";
 import type { Message, Track } from "../wire/messages";

@@ -74,13 +74,13 @@ export class PerformerViewSet {
       const store = performers[number];
       this.all.push(store && new PerformerView(number, store, this.createLoader(store.track.figure)));
     }
-    if (this.extensions) this.extensions.add(extensions);
-    else this.requestExtensions(extensions);
+    this.extensions?.add(extensions);
+    this.requestExtensions(extensions);
   }
 
   /** Store a block of an extension; return false if it is damaged. */
   putExtension(block: Data): boolean {
-    if (this.extensions) return this.extensions.put(block);
+    if (this.extensions && !this.isLoadingExtensions) return this.extensions.put(block);
     if (this.earlyBlocks.length < MAX_EARLY_BLOCKS) this.earlyBlocks.push(block);
     return true;
   }
@@ -128,26 +128,35 @@ export class PerformerViewSet {
     return pose;
   }
 
-  /** Load the code of extensions. That of contacts alone waits for the first pose, which they do not change. */
+  /** Load the missing code of extensions. That of contacts alone waits for the first pose, which they do not change. */
   private requestExtensions(extensions: TrackSet["extensions"]): void {
-    const isStarted = this.firstPoseMs !== null;
-    if ([...extensions.values()].some(({ part }) => isStarted || part !== CONTACT_PART)) void this.loadExtensions();
+    const hasValues = [...extensions.values()].some(({ part }) => part !== CONTACT_PART);
+    const isComplete = this.extensions && (this.extensions.openExtension || !hasValues);
+    const isWanted = hasValues || (extensions.size > 0 && this.firstPoseMs !== null);
+    if (isWanted && !isComplete) void this.loadExtensions(hasValues);
   }
 
-  private async loadExtensions(): Promise<void> {
+  private async loadExtensions(hasValues: boolean): Promise<void> {
     if (this.isLoadingExtensions) return;
     this.isLoadingExtensions = true;
     try {
-      const { ExtensionPoses } = await import("../playout/extension-poses");
+      const [{ ExtensionPoses }, values] = await Promise.all([
+        import("../playout/extension-poses"),
+        hasValues ? import("../playout/extension-values") : null,
+      ]);
       if (!this.tracks) return;
-      this.extensions = new ExtensionPoses();
+      this.extensions ??= new ExtensionPoses();
+      this.extensions.openExtension ??= values?.openExtension ?? null;
       this.extensions.add(this.tracks.extensions);
       for (const block of this.earlyBlocks.splice(0)) this.extensions.put(block);
     } catch {
       // the figures move without; the next motion tries again
+      return;
     } finally {
       this.isLoadingExtensions = false;
     }
+    // meanwhile another motion may have come
+    this.requestExtensions(this.tracks.extensions);
   }
 
   private async loadLive(): Promise<void> {

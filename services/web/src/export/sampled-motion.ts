@@ -7,7 +7,7 @@ import { chainJoints, type Hands } from "../motion/hands";
 import type { Placement } from "../motion/placement";
 import { copyPose, type Figure, JOINT_COUNT, type Pose, restPose } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
-import type { ExtensionBlockStore } from "../playout/extension-poses";
+import type { ExtensionBlockStore } from "../playout/extension-values";
 import type { FrameValues } from "./export-skeleton";
 
 /** Body extension of a sampled motion: values [frame][E][3], radians. */

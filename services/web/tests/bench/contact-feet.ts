@@ -12,6 +12,7 @@ import type { StagedPose } from "../../src/motion/extension";
 import { type Figure, restPose } from "../../src/motion/skeleton";
 import { MotionBlockStore } from "../../src/playout/block-store";
 import { ExtensionPoses } from "../../src/playout/extension-poses";
+import { openExtension } from "../../src/playout/extension-values";
 import type { Performer } from "../../src/stage/puppet/performer";
 import { PlantedFeet } from "../../src/stage/puppet/planted-feet";
 import { Puppet, setPlantedFeet } from "../../src/stage/puppet/puppet";
@@ -63,7 +64,7 @@ interface DrawnFigure {
 
 class Clip {
   private readonly store: MotionBlockStore;
-  private readonly extensions = new ExtensionPoses();
+  private readonly extensions = new ExtensionPoses(openExtension);
   private readonly pose = restPose();
 
   constructor(file: string, meanErrorMm: number) {

@@ -111,3 +111,21 @@ test("contacts of a motion without their track are not known", async () => {
   await vi.waitFor(() => expect(viewer.poseAt(0)?.extended).toBeTruthy());
   expect(viewer.poseAt(0)?.contacts).toBeNull();
 });
+
+test("an extension that is described after contacts is added to them", async () => {
+  const { tracks, valid } = contactVectors();
+  const withContacts = { ...description(), tracks: [goldenDescription(), tracks[0]] } as Message;
+  start(withContacts, data(0, motionBlock), data(1, decodeBase64(valid[0].block)));
+  await vi.waitFor(() => expect(viewer.poseAt(0)?.contacts?.planted).toBe(3));
+  expect(viewer.poseAt(0)?.extended).toBeNull();
+  const withBoth = { ...description(), tracks: [goldenDescription(), tracks[0], extension()] } as Message;
+  FakeWebSocket.last.receive(withBoth, data(2, extensionBlock));
+  await vi.waitFor(() => expect(viewer.poseAt(0)?.extended).toBeTruthy());
+  expect(viewer.poseAt(0)?.contacts?.planted).toBe(3);
+  const plain = connect();
+  start({ ...description(), tracks: [goldenDescription(), tracks[0], extension()] } as Message, data(0, motionBlock));
+  await vi.waitFor(() => expect(plain.poseAt(0)?.extended).toBeTruthy());
+  const orientations = (one: Viewer) => [...(one.poseAt(0)?.extended?.extraOrientations ?? [])];
+  expect(orientations(plain)).not.toEqual(orientations(viewer));
+  plain.close();
+});

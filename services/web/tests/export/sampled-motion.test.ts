@@ -4,7 +4,7 @@ import { EXPRESSIONS, faceExpressions } from "../../src/motion/face";
 import { STAGE_CENTRE } from "../../src/motion/placement";
 import { restPose } from "../../src/motion/skeleton";
 import { MotionBlockStore } from "../../src/playout/block-store";
-import { ExtensionBlockStore } from "../../src/playout/extension-poses";
+import { ExtensionBlockStore } from "../../src/playout/extension-values";
 import { goldenHandsFaceTrack, handsFaceVectors } from "../golden-hands-face";
 import { type BlockVectors, goldenTrack } from "../golden-motion";
 import { decodeBase64, loadVectors } from "../golden-vectors";

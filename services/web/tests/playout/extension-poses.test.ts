@@ -2,6 +2,7 @@ import { describe, expect, test } from "vitest";
 import type { ExtendedPose, StagedPose } from "../../src/motion/extension";
 import { createWorldTransforms, type Figure, worldTransforms } from "../../src/motion/skeleton";
 import { ExtensionPoses } from "../../src/playout/extension-poses";
+import { openExtension } from "../../src/playout/extension-values";
 import type { Data, Track } from "../../src/wire/messages";
 import { contactVectors } from "../golden-contacts";
 import { extensionVectors, goldenDescription } from "../golden-extensions";
@@ -32,7 +33,7 @@ function extendedHead(poses: ExtensionPoses, position = 0): number[] {
 }
 
 test("a performer without extension has none", () => {
-  const poses = new ExtensionPoses();
+  const poses = new ExtensionPoses(openExtension);
   expect(poses.performer(0)).toBeNull();
   poses.add(tracks);
   expect(poses.performer(0)).not.toBeNull();
@@ -40,7 +41,7 @@ test("a performer without extension has none", () => {
 });
 
 test("the joints follow the figure alone until a block is there", () => {
-  const poses = new ExtensionPoses();
+  const poses = new ExtensionPoses(openExtension);
   poses.add(tracks);
   const alone = extendedHead(poses);
   expect(alone.every(Number.isFinite)).toBe(true);
@@ -51,7 +52,7 @@ test("the joints follow the figure alone until a block is there", () => {
 });
 
 test("a damaged block is reported, and an unknown track skipped", () => {
-  const poses = new ExtensionPoses();
+  const poses = new ExtensionPoses(openExtension);
   poses.add(tracks);
   expect(poses.put({ ...block(0), block: new Uint8Array(70_000) })).toBe(false);
   expect(poses.put({ ...block(0), index: 99 })).toBe(false);
@@ -59,13 +60,13 @@ test("a damaged block is reported, and an unknown track skipped", () => {
 });
 
 test("an unusable description is skipped", () => {
-  const poses = new ExtensionPoses();
+  const poses = new ExtensionPoses(openExtension);
   poses.add(new Map([[1, { type: "extension", codec: "bunraku.extension/9" }]]));
   expect(poses.performer(0)).toBeNull();
 });
 
 test("the hands keep their orientation", () => {
-  const poses = new ExtensionPoses();
+  const poses = new ExtensionPoses(openExtension);
   poses.add(tracks);
   const world = worldTransforms(figure, pose, createWorldTransforms());
   const extended = extendedAt(poses, 0);
@@ -77,7 +78,7 @@ test("the hands keep their orientation", () => {
 describe("fingers and face", () => {
   const parts = handsFaceVectors();
   const staged = (received: readonly number[]) => {
-    const poses = new ExtensionPoses();
+    const poses = new ExtensionPoses(openExtension);
     poses.add(new Map(parts.tracks.map((track, n) => [n, { ...goldenHandsFaceDescription(track), performer: 0 }])));
     for (const { track, block: data } of parts.valid.filter((_, n) => received.includes(n)))
       poses.put({ name: "Data", track, rate: 0, index: 0, block: decodeBase64(data) });
@@ -105,7 +106,7 @@ describe("fingers and face", () => {
 describe("contacts", () => {
   const contacts = contactVectors();
   const stagedAt = (position: number, received = contacts.valid): StagedPose => {
-    const poses = new ExtensionPoses();
+    const poses = new ExtensionPoses(openExtension);
     poses.add(new Map(contacts.tracks.map((track, n) => [n, track])));
     for (const { track, index, block: data } of received)
       expect(poses.put({ name: "Data", track, rate: 0, index, block: decodeBase64(data) })).toBe(true);
@@ -125,7 +126,7 @@ describe("contacts", () => {
   });
 
   test("of an unknown codec are not known", () => {
-    const poses = new ExtensionPoses();
+    const poses = new ExtensionPoses(openExtension);
     poses.add(new Map([[1, { ...contacts.tracks[0], codec: "bunraku.contact/9" }]]));
     expect(poses.performer(0)).toBeNull();
   });
