@@ -7,6 +7,7 @@ from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import ERROR_BOUNDS_MM, BitrateLevel, EncodedMotion, encode_motion
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.reencoder import reencode_lower_levels
+from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion, joint_and_tip_positions
 from tests.vectors.blocks import random_motion
 
@@ -26,12 +27,13 @@ def decode(track: MotionTrack, level: BitrateLevel) -> Motion:
     return Motion(track.figure, track.fps, root, rotations)
 
 
-def errors_mm(track: MotionTrack, level: BitrateLevel) -> np.ndarray:
-    motion = decode(track, level)
-    decoded = joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
-    return (
-        np.linalg.norm(decoded - joint_and_tip_positions(SOURCE.figure, SOURCE.root, SOURCE.rotations), axis=-1) * 1e3
+def errors_mm(track: MotionTrack, level: BitrateLevel) -> Array:
+    decoded, source = (
+        joint_and_tip_positions(motion.figure, motion.root, motion.rotations)
+        for motion in (decode(track, level), SOURCE)
     )
+    errors: Array = np.linalg.norm(decoded - source, axis=-1) * 1e3
+    return errors
 
 
 def test_levels_get_smaller_and_keep_their_bounds_against_the_source(stored: EncodedMotion) -> None:

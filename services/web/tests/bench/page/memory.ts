@@ -141,7 +141,8 @@ async function playRound(page: Page, clip: string): Promise<void> {
   await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent !== before, before);
   await waitForFirstPose(page);
   const name = await page.locator(".brand-piece").innerText();
-  await page.locator(".motion", { hasText: before }).click();
+  // beside the tools of the entry, which cover its middle while the mouse is over it
+  await page.locator(".motion", { hasText: before }).click({ position: { x: 30, y: 20 } });
   await page.waitForFunction((before) => document.querySelector(".brand-piece")?.textContent === before, before);
   await waitForFirstPose(page);
   await page.getByRole("button", { name: `Remove ${name}` }).focus();
