@@ -83,7 +83,8 @@ export function renderSlot(
       segment.startSample === null
         ? position === null
         : position !== null && Math.abs(segment.startSample - position) < MAX_CONTINUOUS_OFFSET;
-    const from = isContinuous ? position : segment.startSample;
+    // A whole sample, so that at the sound's own speed nothing has to be resampled.
+    const from = isContinuous ? position : segment.startSample && Math.round(segment.startSample);
     if (from !== null) fillFrames(track, sound, from, slot.speed, planes, first, end);
     if (!isContinuous) {
       jump = planes.map((plane, channel) => last[channel] - plane[first]);
@@ -96,8 +97,11 @@ export function renderSlot(
     last = planes.map((plane) => plane[end - 1]);
     position = from === null ? null : from + (end - first) * slot.speed;
   }
-  const isSilent = planes.every((plane) => plane.every((sample) => Math.abs(sample) < SILENCE_LEVEL));
-  return { planes, isSilent, boundary: { nextSample: position, lastSamples: last, jump, framesSinceJump } };
+  return {
+    planes,
+    isSilent: planes.every(isInaudible),
+    boundary: { nextSample: position, lastSamples: last, jump, framesSinceJump },
+  };
 }
 
 /** Split a span of a slot into segments that are audible or silent. */
@@ -129,6 +133,11 @@ function segmentsOf(
   return segments;
 }
 
+function isInaudible(plane: Float32Array): boolean {
+  for (let frame = 0; frame < plane.length; frame++) if (Math.abs(plane[frame]) >= SILENCE_LEVEL) return false;
+  return true;
+}
+
 /** Fill frames `first`..`end` with the sound from sample `position` on. */
 function fillFrames(
   track: AudioTrack,
@@ -140,19 +149,35 @@ function fillFrames(
   end: number,
 ): void {
   const wholeSample = Math.floor(position);
-  const from = wholeSample - (HALF_TAPS - 1);
+  if (speed === 1 && position === wholeSample) {
+    planes.forEach((plane, channel) => {
+      copySamples(track, sound, channel, wholeSample, plane.subarray(first, end));
+    });
+    return;
+  }
   const size = Math.ceil((end - first) * speed) + 2 * HALF_TAPS + 2;
   planes.forEach((plane, channel) => {
     const samples = new Float32Array(size);
-    for (let filled = 0; filled < size; ) {
-      const within = from + filled + track.preSkip;
-      const number = Math.floor(within / PACKET_SAMPLES);
-      const offset = within - number * PACKET_SAMPLES;
-      const count = Math.min(PACKET_SAMPLES - offset, size - filled);
-      const source = number < 0 ? null : sound(number);
-      if (source) samples.set(source[channel].subarray(offset, offset + count), filled);
-      filled += count;
-    }
+    copySamples(track, sound, channel, wholeSample - (HALF_TAPS - 1), samples);
     resample(samples, position - wholeSample, speed, plane, first, end);
   });
+}
+
+/** Copy the samples of a channel from sample `from` on; those of packets that are not there stay as they are. */
+function copySamples(
+  track: AudioTrack,
+  sound: (number: number) => ChannelPlanes | null,
+  channel: number,
+  from: number,
+  out: Float32Array,
+): void {
+  for (let filled = 0; filled < out.length; ) {
+    const within = from + filled + track.preSkip;
+    const number = Math.floor(within / PACKET_SAMPLES);
+    const offset = within - number * PACKET_SAMPLES;
+    const count = Math.min(PACKET_SAMPLES - offset, out.length - filled);
+    const source = number < 0 ? null : sound(number);
+    if (source) out.set(source[channel].subarray(offset, offset + count), filled);
+    filled += count;
+  }
 }

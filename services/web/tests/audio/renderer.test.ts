@@ -85,6 +85,14 @@ test("slots at speed 1 reproduce the sound exactly in every channel", () => {
   });
 });
 
+test("sound that starts between two samples is copied from the nearest one", () => {
+  const track = createTrack(1);
+  // 0.4 samples after a whole one, and 1,000 samples after the start
+  const { out } = play(track, timelines(1_000_000), [1, 1], () => true, STAGE + (1_000.4 / 48_000) * 1e6);
+  for (let frame = CROSSFADE_FRAMES; frame < 2 * SLOT_FRAMES; frame++)
+    expect(out[0][frame]).toBe(Math.fround(toneSample(1_000 + frame)));
+});
+
 test("changes of speed are continuous and follow the slots", () => {
   const speeds = fc.array(
     fc.integer({ min: -10, max: 10 }).map((halves) => 1 + halves * 0.0005),
