@@ -25,7 +25,7 @@ import {
   SHARE_HALF_LIFE_S,
 } from "./constants";
 import { pathTo } from "./follower";
-import { add, distanceOf, lengthOf, ORIGIN, type Point, rotated, scaled, subtract, unitOr } from "./point";
+import { add, distanceOf, dotOf, lengthOf, ORIGIN, type Point, rotated, scaled, subtract, unitOr } from "./point";
 import { brakingSpeed, keepWithin, limitChange, steer, wallBefore } from "./steering";
 
 /** Distance and speed below which a hand counts as joined to the pair. */
@@ -133,6 +133,15 @@ export class Bond {
     this.reduceOffset(0, begin, carrier, seconds);
     this.reduceOffset(1, begin, carrier, seconds);
     return true;
+  }
+
+  /** Move the joined pair to a position next to its own, where the shoulders' limits keep it. */
+  stayAt(position: Point): void {
+    const moved = subtract(position, this.point);
+    if (lengthOf(moved) === 0) return;
+    this.point = position;
+    const back = unitOr(moved, ORIGIN);
+    this.velocity = subtract(this.velocity, scaled(back, Math.min(dotOf(this.velocity, back), 0)));
   }
 
   private mean(first: Point, second: Point): Point {

@@ -15,7 +15,7 @@ const track = MotionTrack.fromDescription({ ...goldenDescription(), front: 0.25,
 
 /** Return the context of a frame without a predictor. */
 function frame(clock: number, overlays = new OverlayBuffer()): FrameContext {
-  return { clock, nowMs: 0, overlays, predictor: null };
+  return { clock, nowMs: 0, overlays, predictor: null, partner: () => null };
 }
 
 /** Create performer `number` of the golden motion at another placement. */
