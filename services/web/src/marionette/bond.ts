@@ -157,7 +157,7 @@ export class Bond {
     const velocities = bySide((side) => add(own[side], carrier.slip(side, positions[side], seconds)));
     const mean = rotated(carrier.rotation, this.mean(...velocities));
     const maxChange = 0.5 * HAND_ACCELERATION * unitM * seconds;
-    const gaps = carrier.border(shells, seconds)(carrier.move(this.point));
+    const gaps = carrier.border(shells, seconds).gaps(carrier.move(this.point));
     const within = keepWithin(
       mean,
       gaps.map((gap) => wallBefore(gap, maxChange, seconds)),

@@ -38,5 +38,5 @@ test("the whole share follows one shoulder, and the other drifts", () => {
     { centre: ORIGIN, inner: 0.1, outer: 0.6 },
     { centre: [0.8, 0, 0] as const, inner: 0.1, outer: 0.6 },
   ] as const;
-  expect(carrier.border(shells, 0.1)([0.4, 0, 0])).toHaveLength(5);
+  expect(carrier.border(shells, 0.1).gaps([0.4, 0, 0])).toHaveLength(5);
 });
