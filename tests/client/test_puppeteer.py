@@ -164,4 +164,4 @@ async def test_bond_lost_with_its_hands_is_requested_again(server: str, clip_fil
             await puppeteer.release("left_hand")
             await puppeteer.claim("left_hand")
             await puppeteer.target("left_hand", *TARGET)
-            assert puppeteer.bonds == ()
+            assert not puppeteer.bonds
