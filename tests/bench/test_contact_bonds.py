@@ -20,6 +20,10 @@ def test_fast_way_along_the_border_is_within_the_acceleration(seed: int) -> None
     assert measure_scene(seed).acceleration <= 80.0
 
 
+def test_pair_whose_weights_change_at_once_is_within_the_acceleration() -> None:
+    assert measure_scene(9334).acceleration <= 80.0
+
+
 def test_scenes_of_one_seed_are_equal_and_of_two_differ() -> None:
     one, same, other = Scene(5), Scene(5), Scene(9)
     for scene in (one, same, other):

@@ -70,6 +70,8 @@ export class Bond {
   private unitM: number;
   private point: Point;
   private velocity: Point = ORIGIN;
+  /** Spread of both shoulders' frames at the pair, in the last frame. */
+  private spread: Point = ORIGIN;
   private readonly offsets: [Point, Point];
   private readonly offsetVelocities: [Point, Point] = [ORIGIN, ORIGIN];
   /** Velocities relative to each hand's own shoulder, until the first step. */
@@ -120,8 +122,8 @@ export class Bond {
     if (seconds <= 0) return true;
     const carrier = new Carrier(this.shoulders, shoulders, newShare);
     // the same velocity, seen from the frame that is carried with the new weights
-    const faster = subtract(carrier.slip(0, this.point, seconds), carrier.slip(1, this.point, seconds));
-    this.velocity = add(this.velocity, scaled(faster, this.share - newShare));
+    this.velocity = add(this.velocity, scaled(this.spread, this.share - newShare));
+    this.spread = carrier.spread(this.point, seconds);
     this.share = newShare;
     if (this.ownVelocities) this.beginMoving(this.ownVelocities, shells, carrier, seconds);
     this.ownVelocities = null;
