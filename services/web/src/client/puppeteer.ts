@@ -209,6 +209,8 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
       case "Welcome":
         this.id = message.id;
         this.colour = message.colour;
+        // a replaced connection was not lost before
+        this.bondRequests.disconnect();
         this.reclaimAll();
         this.dispatchEvent(new Event("welcome"));
         break;

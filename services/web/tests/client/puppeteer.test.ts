@@ -179,6 +179,18 @@ describe("a bond of two hands", () => {
     expect(socket.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [0, 1], wanted: true }]);
   });
 
+  test("is requested again on a connection that replaces another", () => {
+    puppeteer.claim(0);
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
+    puppeteer.bond(0, 1);
+    presence([[0, 1]]);
+    viewer.dispatchEvent(new Event("replaced"));
+    socket = FakeWebSocket.last;
+    socket.accept();
+    socket.receive({ name: "Welcome", id: "b2", colour: 3, lead: 100_000 }, { name: "Grant", limb: 0, epoch: 4 });
+    expect(socket.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [0, 1], wanted: true }]);
+  });
+
   test("that was lost with its hand is requested again, one that was let go is not", () => {
     puppeteer.claim(0);
     socket.receive({ name: "Grant", limb: 0, epoch: 3 });
