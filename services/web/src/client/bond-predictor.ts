@@ -6,6 +6,8 @@ import type { StagedFrame } from "./performer-view";
 import type { PredictedBond, PredictedHand } from "./predicted-bond";
 import type { BondedLimb } from "./predicted-limb";
 
+const NO_BONDS: ReadonlyMap<number, BondedLimb> = new Map();
+
 /** Bonds at one puppeteer. */
 export class BondPredictor {
   private readonly bonds = new Map<string, PredictedBond>();
@@ -29,7 +31,8 @@ export class BondPredictor {
   }
 
   /** Return what the bonds `pairs` do to the limbs of the frame's performer, by number. */
-  predict(frame: StagedFrame, pairs: readonly LimbPair[]): Map<number, BondedLimb> {
+  predict(frame: StagedFrame, pairs: readonly LimbPair[]): ReadonlyMap<number, BondedLimb> {
+    if (pairs.length === 0 && this.bonds.size === 0) return NO_BONDS;
     const bonded = new Map<number, BondedLimb>();
     const keys = new Set(pairs.map(String));
     for (const key of this.bonds.keys()) if (!keys.has(key)) this.bonds.delete(key);
