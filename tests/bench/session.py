@@ -117,8 +117,10 @@ async def move_hand(client: Client, session: str, run: SessionRun, seconds: floa
         await asyncio.sleep(MOVE_TIMEOUT_US * 1e-6)
 
 
-def extract_hand_positions(rig: ArmRig, messages: list[tuple[int, bytes]]) -> list[tuple[int, int, Vector]]:
-    """Return arrival time, due time and left hand position (arm lengths) of each overlay frame."""
+def extract_hand_positions(
+    rig: ArmRig, messages: list[tuple[int, bytes]], hand: int = 0
+) -> list[tuple[int, int, Vector]]:
+    """Return arrival time, due time and position (arm lengths) of a hand in each overlay frame."""
     found: list[tuple[int, int, Vector]] = []
     for arrived, data in messages:
         if data[0] != Overlay.TYPE:
@@ -126,9 +128,9 @@ def extract_hand_positions(rig: ArmRig, messages: list[tuple[int, bytes]]) -> li
         overlay = Overlay.unpack(data)
         frames = (*overlay.earlier, overlay.limbs)
         for nth, limbs in enumerate(frames):
-            if 0 in limbs:
+            if hand in limbs:
                 due = overlay.due - (len(frames) - 1 - nth) * Overlay.FRAME_INTERVAL_US
-                joints = [_unpack_quaternion(limbs[0][3 * joint : 3 * joint + 3]) for joint in range(3)]
+                joints = [_unpack_quaternion(limbs[hand][3 * joint : 3 * joint + 3]) for joint in range(3)]
                 found.append((arrived, due, rig.tip_target((joints[0], joints[1], joints[2]))))
     return found
 

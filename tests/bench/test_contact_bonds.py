@@ -15,6 +15,15 @@ def test_scene_is_within_the_bounds_and_replays_exactly(seed: int) -> None:
     assert figures.is_replayed
 
 
+@pytest.mark.parametrize("seed", [2366, 3230])
+def test_fast_way_along_the_border_is_within_the_acceleration(seed: int) -> None:
+    assert measure_scene(seed).acceleration <= 80.0
+
+
+def test_pair_whose_weights_change_at_once_is_within_the_acceleration() -> None:
+    assert measure_scene(9334).acceleration <= 80.0
+
+
 def test_scenes_of_one_seed_are_equal_and_of_two_differ() -> None:
     one, same, other = Scene(5), Scene(5), Scene(9)
     for scene in (one, same, other):

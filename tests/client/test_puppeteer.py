@@ -143,3 +143,25 @@ async def test_both_hands_are_bonded_moved_together_and_let_go(server: str, clip
             assert end is not None
             assert end.reason == "released"
             await puppeteer.bond("left_hand", "right_hand")
+
+
+async def test_bond_lost_with_its_hands_is_requested_again(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        async with Puppeteer(client, session, "Aiko") as puppeteer:
+            for limb in ("left_hand", "right_hand"):
+                await puppeteer.claim(limb)
+            await puppeteer.bond("left_hand", "right_hand")
+            with httpx2.Client(base_url=server) as http:
+                # this process is busy until the hands are lost
+                while any(http.get(f"/v1/sessions/{session}").json()["limbs"]):
+                    pass
+            async with asyncio.timeout(HANG_TIMEOUT_S):
+                while puppeteer.bond_end is None or puppeteer.bonds != ((0, 1),):  # noqa: ASYNC110
+                    await asyncio.sleep(0.01)
+            assert puppeteer.bond_end.reason == "lost"
+            # a bond that was let go is not requested again
+            await puppeteer.release("left_hand")
+            await puppeteer.claim("left_hand")
+            await puppeteer.target("left_hand", *TARGET)
+            assert not puppeteer.bonds

@@ -12,6 +12,7 @@ from tests.vectors import (
     asyncapi,
     audio,
     blocks,
+    bonded_stage,
     bonds,
     contacts,
     controlled_limb,
@@ -40,6 +41,7 @@ TYPESCRIPT_FILE = ROOT / "services" / "web" / "src" / "wire" / "messages.ts"
 GENERATORS: dict[str, Callable[[], Any]] = {
     "audio.json": audio.make_vectors,
     "blocks.json": blocks.make_vectors,
+    "bonded_stage.json": bonded_stage.make_vectors,
     "bonds.json": bonds.make_vectors,
     "hand_face_names.json": hand_face_names.make_vectors,
     "joint_mapping.json": joint_mapping.make_vectors,

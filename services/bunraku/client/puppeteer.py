@@ -52,7 +52,7 @@ class Puppeteer:
 
     Limbs are named as in `wire.limbs.LIMBS`, or numbered: limb l of performer k is 4 k + l. While limbs are held, a
     keep-alive message is sent 10 times per second. A limb that was lost because this process was suspended is claimed
-    again, and its last target is sent again.
+    again, its last target is sent again, and then the bonds that ended with it are requested again.
     """
 
     def __init__(self, client: Client, session: str, name: str = "Someone") -> None:
@@ -69,6 +69,9 @@ class Puppeteer:
         """Last input of each held limb: kind and values."""
         self._lost_limbs: set[int] = set()
         """Lost limbs with a pending claim."""
+        self._requested_bonds: set[tuple[int, int]] = set()
+        """Bonds at the request of this puppeteer, until they end otherwise than by a loss of its limbs."""
+        self._lost_bonds: set[tuple[int, int]] = set()
         self._sequence = 0
         self._answers: asyncio.Queue[Grant | Refusal] = asyncio.Queue(64)
         self._presence_changed = asyncio.Condition()
@@ -145,6 +148,7 @@ class Puppeteer:
     async def release(self, limb: str | int) -> None:
         """Release a limb."""
         number = limb_number(limb)
+        self._forget_bonds_of(number)
         if number in self._epochs:
             await self._send(Release(number, self._epochs.pop(number)).pack())
 
@@ -166,10 +170,13 @@ class Puppeteer:
         await self._wait_until(lambda: pair in self.bonds or self._bond_end_reason(pair) is not None)
         if (reason := self._bond_end_reason(pair)) is not None:
             raise ControlRefused(f"{limb} and {other} are not bonded: {reason}")
+        self._requested_bonds.add(pair)
 
     async def unbond(self, limb: str | int, other: str | int) -> None:
         """End the bond of two hands; those that are held stay so."""
         pair = _ordered(limb, other)
+        self._requested_bonds.discard(pair)
+        self._lost_bonds.discard(pair)
         if pair in self.bonds:
             await self._send(Bond(list(pair), False).pack())
             await self._wait_until(lambda: pair not in self.bonds)
@@ -249,7 +256,28 @@ class Puppeteer:
                 self.presence = message
             else:
                 self.bond_end = message
+                self._on_bond_end(_ordered(*message.limbs), message.reason)
             self._presence_changed.notify_all()
+
+    def _on_bond_end(self, pair: tuple[int, int], reason: str) -> None:
+        """Keep a bond that was lost with a limb of this puppeteer, which is claimed again; forget all others."""
+        if pair in self._requested_bonds and reason == "lost" and self._lost_limbs.intersection(pair):
+            self._lost_bonds.add(pair)
+        else:
+            self._lost_bonds.discard(pair)
+        self._requested_bonds.discard(pair)
+
+    def _forget_bonds_of(self, limb: int) -> None:
+        for bonds in (self._requested_bonds, self._lost_bonds):
+            bonds.difference_update([pair for pair in bonds if limb in pair])
+
+    async def _renew_bonds_of(self, limb: int) -> None:
+        """Request the lost bonds of a limb that is granted again, unless the other hand still waits for its grant."""
+        for pair in [pair for pair in self._lost_bonds if limb in pair]:
+            if not self._lost_limbs.intersection(pair):
+                self._lost_bonds.discard(pair)
+                self._requested_bonds.add(pair)
+                await self._send(Bond(list(pair), True).pack())
 
     async def _on_grant(self, grant: Grant) -> None:
         limb, reclaimed = grant.limb, grant.limb in self._lost_limbs
@@ -261,8 +289,10 @@ class Puppeteer:
         self._epochs[limb] = grant.epoch
         if not reclaimed:
             self._answers.put_nowait(grant)
-        elif limb in self._last_inputs:
+            return
+        if limb in self._last_inputs:
             await self._send_input(limb)
+        await self._renew_bonds_of(limb)
 
     async def _on_refusal(self, refusal: Refusal) -> None:
         limb = refusal.limb
@@ -272,6 +302,7 @@ class Puppeteer:
                 await self._send(Claim(limb).pack())
             return
         self._epochs.pop(limb, None)
+        self._forget_bonds_of(limb)
         if limb in self._lost_limbs:
             self._lost_limbs.discard(limb)
         else:

@@ -59,7 +59,15 @@ def test_track_round_trips_with_the_blocks_of_its_motion() -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [{"codec": "bunraku.contact/9"}, {"performer": -1}, {"performer": "0"}, {"frames": 0}, {"fps": "30"}]
+    "change",
+    [
+        {"codec": "bunraku.contact/9"},
+        {"performer": -1},
+        {"performer": "0"},
+        {"performer": True},
+        {"frames": 0},
+        {"fps": "30"},
+    ],
 )
 def test_invalid_description_is_refused(change: dict[str, object]) -> None:
     with pytest.raises(DamagedBlock):

@@ -41,6 +41,7 @@ def test_description_round_trips() -> None:
         {"part": "tail"},
         {"performer": -1},
         {"performer": "0"},
+        {"performer": True},
         {"joints": "text"},
         {"joints": b""},
         {"joints": bytes([0]) + bytes(18)},

@@ -58,3 +58,11 @@ def test_opposite_turns_cancel() -> None:
     w, x, y, z = Carrier(before, now, 0.5).rotation
     assert_near((x, y, z), (0.0, 0.0, 0.0))
     assert abs(w - IDENTITY[0]) < 1e-12
+
+
+@given(points, points, points, shares)
+def test_spread_is_the_difference_of_both_slips(point: Vector, moved: Vector, other: Vector, share: float) -> None:
+    before = (shoulder((0.0, 0.0, 0.0)), shoulder((0.7, 0.0, 0.0), 3.0))
+    carrier = Carrier(before, (shoulder(moved, 0.2), shoulder(other, 2.9)), share)
+    slips = [vector.rotate(carrier.rotation, carrier.slip(side, point, FRAME_S)) for side in (0, 1)]
+    assert_near(carrier.spread(point, FRAME_S), vector.subtract(slips[0], slips[1]))

@@ -68,3 +68,22 @@ def test_point_of_concentric_shells_is_on_the_border_of_the_smaller() -> None:
     assert nearest_common_point(ZERO, large, small) == (0.0, -0.1, 0.0)
     assert len(CommonBorder((large, small), (ZERO, ZERO)).gaps((0.0, 0.3, 0.0))) == 4
     assert max(small.excesses((0.0, 0.5, 0.0))) <= TOLERANCE
+
+
+@given(points, points, st.floats(0.1, 100.0))
+def test_limited_speed_needs_no_more_than_the_acceleration(
+    velocity: Vector, drift: Vector, acceleration: float
+) -> None:
+    border = ShellBorder(Shell(ZERO, 0.1, 0.65), drift)
+    relative = vector.subtract(border.limit_speed(velocity, acceleration), drift)
+    assert vector.dot(relative, relative) / 0.65 <= acceleration * (1.0 + 1e-9)
+    before = vector.subtract(velocity, drift)
+    assert vector.length(vector.cross(relative, before)) < 1e-9
+    if vector.dot(before, before) / 0.65 <= acceleration:
+        assert border.limit_speed(velocity, acceleration) == velocity
+
+
+def test_speed_is_limited_for_both_shells() -> None:
+    border = CommonBorder((Shell(ZERO, 0.1, 0.5), Shell((0.5, 0.0, 0.0), 0.1, 0.6)), ((1.0, 0.0, 0.0), ZERO))
+    assert border.limit_speed((1.0, 1.0, 0.0), 8.0) == (1.0, 1.0, 0.0)
+    assert vector.length(border.limit_speed((-9.0, 5.0, 0.0), 8.0)) <= 4.8**0.5 + 1e-12

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from bunraku.codec.errors import DamagedBlock
-from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart
+from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, is_index
 from bunraku.codec.leb128 import decode_leb128, encode_leb128
 from bunraku.codec.timing import Timing, parse_timing
 from bunraku.motion.contact.foot_contact import FEET, BoolArray
@@ -123,6 +123,6 @@ def parse_contact_track(description: dict[str, Any]) -> ContactTrack:
         raise DamagedBlock(f"Unsupported codec of contacts {description.get('codec')!r}, expected {CONTACT_CODEC!r}.")
     timing = parse_timing(description, EXTENSION_TYPE)
     performer = description.get("performer")
-    if not isinstance(performer, int) or performer < 0:
+    if not is_index(performer):
         raise DamagedBlock("Invalid track of contacts: performer must be an index.")
     return ContactTrack(timing.fps, timing.frames, timing.block_frames, timing.first_frames, performer)

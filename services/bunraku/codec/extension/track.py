@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -151,6 +151,11 @@ def describe_extension_track(track: ExtensionTrack, rates: list[dict[str, float]
     }
 
 
+def is_index(value: Any) -> TypeGuard[int]:
+    """Return whether a value of a description is an index: an integer from 0 on, and no boolean."""
+    return isinstance(value, int) and not isinstance(value, bool) and value >= 0
+
+
 def parse_extension_track(description: dict[str, Any]) -> ExtensionTrack:
     """Return the track of `describe_extension_track`. Raises `DamagedBlock` if it is invalid or of another codec."""
     codec, part, performer = (description.get(key) for key in ("codec", "part", "performer"))
@@ -159,7 +164,7 @@ def parse_extension_track(description: dict[str, Any]) -> ExtensionTrack:
         raise DamagedBlock(f"Unsupported extension of codec {codec!r} and part {part!r}.")
     timing = parse_timing(description, EXTENSION_TYPE)
     packed = description.get(coding.key)
-    if not isinstance(performer, int) or performer < 0 or not isinstance(packed, bytes):
+    if not is_index(performer) or not isinstance(packed, bytes):
         raise DamagedBlock(f"Invalid extension track: performer must be an index, and {coding.key} must be bytes.")
     return ExtensionTrack(
         timing.fps, timing.frames, timing.block_frames, timing.first_frames, performer, *coding.unpack(packed)

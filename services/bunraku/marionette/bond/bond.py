@@ -97,6 +97,8 @@ class Bond:
         reach = [_shell(shoulder) for shoulder in shoulders]
         self._point = nearest_common_point(middle, reach[0], reach[1]) or middle
         self._velocity = ZERO
+        self._spread = ZERO
+        """Spread of both shoulders' frames at the pair, in the last frame."""
         self._offsets = [vector.subtract(position, self._point) for position in positions]
         self._offset_velocities = [ZERO, ZERO]
         self._goal: Vector | None = None
@@ -131,8 +133,8 @@ class Bond:
             return True
         carrier = Carrier(self._shoulders, shoulders, new_share)
         # the same velocity, seen from the frame that is carried with the new weights
-        faster = vector.subtract(*(carrier.slip(side, self._point, seconds) for side in (0, 1)))
-        self._velocity = vector.add(self._velocity, vector.scale(faster, self.share - new_share))
+        self._velocity = vector.add(self._velocity, vector.scale(self._spread, self.share - new_share))
+        self._spread = carrier.spread(self._point, seconds)
         self.share = new_share
         if self._own_velocities is not None:
             self._begin_moving(self._own_velocities, shells, carrier, seconds)

@@ -57,6 +57,10 @@ class Carrier:
         ahead = vector.scale(vector.subtract(self._follow(side, point), self.move(point)), 1.0 / seconds)
         return vector.rotate(vector.conjugate(self.rotation), ahead)
 
+    def spread(self, point: Vector, seconds: float) -> Vector:
+        """Return the velocity of a point at rest in the first shoulder's frame, seen from the second's."""
+        return vector.scale(vector.subtract(self._follow(0, point), self._follow(1, point)), 1.0 / seconds)
+
     def drift(self, side: int, seconds: float) -> Vector:
         """Return the velocity of one shoulder in the carried frame."""
         moved = vector.subtract(self._now[side].position, self.move(self._before[side].position))

@@ -100,6 +100,12 @@ class ShellBorder(NamedTuple):
     shell: Shell
     drift: Vector
 
+    def limit_speed(self, velocity: Vector, acceleration: float) -> Vector:
+        """Return a velocity shortened so that `acceleration` suffices to follow the outer sphere at it."""
+        relative = vector.subtract(velocity, self.drift)
+        speed, most = vector.length(relative), sqrt(acceleration * self.shell.outer)
+        return velocity if speed <= most else vector.add(self.drift, vector.scale(relative, most / speed))
+
     def gaps(self, point: Vector) -> list[Gap]:
         """Return the gaps to the outer and the inner sphere."""
         outward = vector.unit(vector.subtract(point, self.shell.centre), (0.0, -1.0, 0.0))
@@ -120,6 +126,12 @@ class CommonBorder(NamedTuple):
 
     shells: tuple[Shell, Shell]
     drifts: tuple[Vector, Vector]
+
+    def limit_speed(self, velocity: Vector, acceleration: float) -> Vector:
+        """Return a velocity shortened for the first and then for the second shell."""
+        for shell, drift in zip(self.shells, self.drifts, strict=True):
+            velocity = ShellBorder(shell, drift).limit_speed(velocity, acceleration)
+        return velocity
 
     def gaps(self, point: Vector) -> list[Gap]:
         """Return the gaps to the four spheres, and to the cylinder through the rim if that encloses the reach."""

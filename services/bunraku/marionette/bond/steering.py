@@ -38,6 +38,8 @@ def steer(
     """
     free_change = min(max_change, max_free_change)
     walls = [wall_before(gap, 0.5 * max_change, seconds) for gap in border.gaps(start)]
+    # the other half of the change is for the curvature of the border
+    aim = border.limit_speed(aim, 0.5 * max_change / seconds)
     velocity = before
     for _ in range(WALL_ROUNDS):
         forced = limit_change(before, keep_within(before, walls), max_change)

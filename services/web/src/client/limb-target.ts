@@ -25,7 +25,7 @@ export const THIGH_RANGE: readonly [number, number] = [MIN_THIGH_ANGLE_RAD, MAX_
 const MAX_TARGET_DURATION_MS = MAX_TARGET_DURATION_US / 1000;
 
 /** Time without an input after which the target of a bonded hand follows the pair. */
-const FOLLOW_DELAY_MS = 1_000;
+export const FOLLOW_DELAY_MS = 1_000;
 
 /** Target of one limb. */
 export class LimbTarget {
@@ -86,6 +86,11 @@ export class LimbTarget {
     this.set(place[0], place[1], place[2]);
     this.durationMs = 0;
     this.isKnown = this.hasFollowed = true;
+  }
+
+  /** Return the time since the last input, or the claim, in seconds; 0 while an input moves the value. */
+  inputAgeS(nowMs: number): number {
+    return this.velocity.some((part) => part !== 0) ? 0 : Math.max(nowMs - this.inputAt, 0) / 1000;
   }
 
   /** Set the target; one out of reach is clamped. */

@@ -105,18 +105,29 @@ export class PerformerViewSet {
     const view = this.all[performer];
     if (!view) return null;
     const position = positionAt(timeline, clock);
-    const isLive = this.live !== null && view.seekLive(this.live, clock);
+    const seek = (other: PerformerView): "live" | "motion" | null => {
+      if (this.live !== null && other.seekLive(this.live, clock)) return "live";
+      return other.seek(position, timeline.loop, timeline.duration) ? "motion" : null;
+    };
+    const source = seek(view);
+    const isLive = source === "live";
     if (isLive) {
       if (performer === 0) this.onPoseShown(nowMs);
     } else {
-      const hasBlock = view.seek(position, timeline.loop, timeline.duration);
+      const hasBlock = source !== null;
       if (performer === 0) {
         const index = view.store.track.blockAt(position);
         if (hasBlock) this.onBlockShown(view.store.levels[index], nowMs);
         else if (timeline.playing && view.hasPose) this.onBlockMissing(index);
       }
     }
-    const pose: StagedPose | null = view.pose({ clock, nowMs, overlays: this.overlays, predictor: this.predictor });
+    const { overlays, predictor } = this;
+    const partner = (number: number) => {
+      const other = this.all[number] ?? null;
+      if (other) seek(other);
+      return other;
+    };
+    const pose: StagedPose | null = view.pose({ clock, nowMs, overlays, predictor, partner });
     if (!pose) return null;
     pose.extended = pose.hands = pose.face = pose.contacts = null;
     if (!isLive)

@@ -8,10 +8,17 @@ import type { OverlayBuffer } from "../playout/overlay-buffer";
 import type { PredictionFrame } from "./predicted-limb";
 import type { SolverLoader } from "./solver-loader";
 
+/** Frame of one performer among those of the others, whose hands may be bonded to it. */
+export interface StagedFrame extends PredictionFrame {
+  readonly placement: Placement;
+  /** Return the frame of another performer at the same instant, null if it cannot be predicted. */
+  partner(performer: number): StagedFrame | null;
+}
+
 /** Source of predictions for the limbs that this page controls: a puppeteer. */
 export interface LimbPredictor {
   /** Apply the predictions to the frame's pose. Return the mask of the performer's limbs that are predicted. */
-  applyOwnLimbs(frame: PredictionFrame): number;
+  applyOwnLimbs(frame: StagedFrame): number;
 }
 
 /** Instant and live inputs of a drawn frame. */
@@ -22,6 +29,8 @@ export interface FrameContext {
   readonly nowMs: number;
   readonly overlays: OverlayBuffer;
   readonly predictor: LimbPredictor | null;
+  /** Return another performer's view, moved to this instant; null if there is none. */
+  partner(performer: number): PerformerView | null;
 }
 
 /** One performer of a motion. */
@@ -32,6 +41,8 @@ export class PerformerView implements StagedPerformer {
   controlledLimbs = 0;
   private readonly motionPose = restPose();
   private readonly mergedPose = restPose();
+  /** Pose for the predictions of another performer. */
+  private partnerPose: Pose | null = null;
 
   /**
    * @param number number of the performer
@@ -82,14 +93,32 @@ export class PerformerView implements StagedPerformer {
    * Return the pose at the current position with overlays and predicted limbs, placed on the stage; null before the
    * first pose. The next call reuses the storage.
    */
-  pose({ clock, nowMs, overlays, predictor }: FrameContext): Pose | null {
+  pose(context: FrameContext): Pose | null {
     if (!this.hasPose) return null;
-    const { motionPose: motion, mergedPose: pose, number: performer } = this;
-    const { solver } = this.solverLoader;
-    copyPose(motion, pose);
-    const overlaidMask = overlays.apply(clock, pose, performer);
-    const frame = solver && { performer, pose, motion, overlaidMask, nowMs, solver };
-    this.controlledLimbs = overlaidMask | ((frame && predictor?.applyOwnLimbs(frame)) ?? 0);
+    const { mergedPose: pose } = this;
+    const overlaidMask = this.mergeOverlays(pose, context);
+    const frame = this.predictionFrame(pose, overlaidMask, context);
+    this.controlledLimbs = overlaidMask | ((frame && context.predictor?.applyOwnLimbs(frame)) ?? 0);
     return applyPlacement(pose, this.placement);
+  }
+
+  /** Return the frame at the current position without predictions, null without a pose or a solver. */
+  partnerFrame(context: FrameContext): StagedFrame | null {
+    if (!this.hasPose) return null;
+    this.partnerPose ??= restPose();
+    return this.predictionFrame(this.partnerPose, this.mergeOverlays(this.partnerPose, context), context);
+  }
+
+  /** Write the motion's pose with the overlays; return the mask of the limbs that they replace. */
+  private mergeOverlays(pose: Pose, { clock, overlays }: FrameContext): number {
+    copyPose(this.motionPose, pose);
+    return overlays.apply(clock, pose, this.number);
+  }
+
+  private predictionFrame(pose: Pose, overlaidMask: number, context: FrameContext): StagedFrame | null {
+    const { motionPose: motion, number: performer, placement } = this;
+    const { solver } = this.solverLoader;
+    const partner = (other: number) => context.partner(other)?.partnerFrame(context) ?? null;
+    return solver && { performer, pose, motion, overlaidMask, nowMs: context.nowMs, solver, placement, partner };
   }
 }

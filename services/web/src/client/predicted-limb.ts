@@ -1,13 +1,15 @@
 /**
  * Prediction of one limb that this page controls: it moves at once, as the session will move it for all viewers.
  *
- * After its return to the motion, in a bond, and while another puppeteer holds it, the limb is shown as the session
- * sends it. Transitions between the two are smooth (`marionette/correction`). Times are local milliseconds.
+ * After its return to the motion, and while another puppeteer holds it, the limb is shown as the session sends it.
+ * Transitions between the two are smooth (`marionette/correction`). A hand in a bond is where the prediction of the
+ * bond has it (`predicted-bond`), whoever holds it. Times are local milliseconds.
  */
 
-import type { ControlledLimb } from "../marionette/controlled-limb";
+import type { ControlledHand, ControlledLimb } from "../marionette/controlled-limb";
 import { Correction } from "../marionette/correction";
 import { Handover } from "../marionette/handover";
+import type { Point } from "../marionette/point";
 import { LIMB_FIRST_JOINTS, type Pose } from "../motion/skeleton";
 import { limbWithinPerformer } from "../wire/limbs";
 import { LimbTarget } from "./limb-target";
@@ -35,6 +37,9 @@ export interface PredictionFrame {
   readonly solver: LimbSolver;
 }
 
+/** What a bond does to one limb: none; shown as the session sends it; or predicted at a place. */
+export type BondedLimb = null | "shown" | Point;
+
 /** Prediction of one limb. */
 export class PredictedLimb {
   readonly target: LimbTarget;
@@ -47,6 +52,8 @@ export class PredictedLimb {
   private readonly localNumber: number;
   private readonly offset: number;
   private drawnAt: number | null = null;
+  /** Seconds of the current frame, 0 once they are applied. */
+  private frameS = 0;
   private controlled: ControlledLimb | null = null;
   /** True from the claim until the limb is back in the motion. */
   private hasLeftMotion = false;
@@ -63,48 +70,70 @@ export class PredictedLimb {
   }
 
   /**
-   * Apply the prediction to the frame's pose, unless another puppeteer holds the limb (`isHeldByOther`), or it is a
-   * hand in a bond (`isBonded`): a bonded hand is shown as the session sends it, at the other hand of the pair. Return
-   * whether the limb is predicted.
+   * Observe the motion, once for each frame; `apply` must follow. Return the limb, and the seconds since the last
+   * frame.
    */
-  apply(
-    { pose, motion, overlaidMask, nowMs, solver }: PredictionFrame,
-    isHeldByOther: boolean,
-    isBonded = false,
-  ): boolean {
-    const { target, handover, correction, joints, offset } = this;
-    const seconds = this.drawnAt === null ? 0 : Math.min(Math.max(nowMs - this.drawnAt, 0) / 1000, MAX_STEP_S);
-    this.drawnAt = nowMs;
-    const isOverlaid = ((overlaidMask >> this.localNumber) & 1) !== 0;
-    const isHeldHere = target.isHeld && !isHeldByOther;
+  beginFrame({ motion, nowMs, solver }: PredictionFrame): { controlled: ControlledLimb; seconds: number } {
     const controlled = solver.limbs[this.localNumber];
     if (controlled !== this.controlled) {
       // the figure changed: a held limb continues from its position in the motion
       this.controlled = controlled;
       this.isPredicted = false;
-    }
-    handover.advance(isHeldHere, seconds);
-    controlled.observePose(motion.rotations, seconds);
-    if (isHeldHere && isBonded) {
-      controlled.placeInPose(this.shownPlace, pose.rotations);
-      target.follow(this.shownPlace, nowMs);
-    } else if (isHeldHere && !this.hasLeftMotion) {
-      this.hasLeftMotion = true;
-      // while an earlier control is still shown, start from the shown position
-      if (isOverlaid && !this.isPredicted) controlled.startFrom(pose.rotations);
-    }
-    this.step(controlled, motion, nowMs, seconds);
+    } else if (nowMs === this.drawnAt) return { controlled, seconds: this.frameS };
+    this.frameS = this.drawnAt === null ? 0 : Math.min(Math.max(nowMs - this.drawnAt, 0) / 1000, MAX_STEP_S);
+    this.drawnAt = nowMs;
+    controlled.observePose(motion.rotations, this.frameS);
+    return { controlled, seconds: this.frameS };
+  }
+
+  /** Start to control the limb, from where it is shown: after `beginFrame`. */
+  leaveMotion(frame: PredictionFrame): void {
+    if (this.hasLeftMotion) return;
+    this.hasLeftMotion = true;
+    // while an earlier control is still shown, start from the shown position
+    if (this.isOverlaidIn(frame) && !this.isPredicted) this.controlled?.startFrom(frame.pose.rotations);
+  }
+
+  /** Return true if the session's overlays replace the limb in the frame. */
+  isOverlaidIn({ overlaidMask }: PredictionFrame): boolean {
+    return ((overlaidMask >> this.localNumber) & 1) !== 0;
+  }
+
+  /** Return the place of the limb (3) in the frame's pose, before the prediction is applied; live storage. */
+  placeIn({ pose }: PredictionFrame): Float64Array {
+    this.controlled?.placeInPose(this.shownPlace, pose.rotations);
+    return this.shownPlace;
+  }
+
+  /**
+   * Apply the prediction to the frame's pose, unless the limb is shown as the session sends it: while another puppeteer
+   * holds it (`isHeldByOther`), or in a bond that is not predicted. Return whether the limb is predicted.
+   */
+  apply(frame: PredictionFrame, isHeldByOther: boolean, bonded: BondedLimb = null): boolean {
+    const { pose, motion, nowMs } = frame;
+    const { target, handover, correction, joints, offset } = this;
+    const { controlled, seconds } = this.beginFrame(frame);
+    this.frameS = 0;
+    const isHeldHere = target.isHeld && !isHeldByOther;
+    const isBonded = bonded !== null && bonded !== "shown";
+    handover.advance(isHeldHere || isBonded, seconds);
+    if (isHeldHere && bonded === "shown") target.follow(this.placeIn(frame), nowMs);
+    else if (isHeldHere || isBonded) this.leaveMotion(frame);
+    if (isBonded) {
+      // only hands are bonded
+      (controlled as ControlledHand).solveBondedJoints(joints, 0, motion.rotations, bonded, handover.weight, seconds);
+    } else this.step(controlled, motion, nowMs, seconds);
+    const isShown = bonded === "shown" || (isHeldByOther && !isBonded);
     const isPredicted =
-      !isHeldByOther &&
-      !isBonded &&
-      (this.hasLeftMotion || (this.isPredicted && isOverlaid && this.sinceReturnS < MAX_RETURN_S));
+      !isShown &&
+      (this.hasLeftMotion || (this.isPredicted && this.isOverlaidIn(frame) && this.sinceReturnS < MAX_RETURN_S));
     correction.advance(seconds);
     if (isPredicted && !this.isPredicted) correction.begin(pose.rotations, offset, joints, 0);
     if (!isPredicted && this.isPredicted) correction.begin(joints, 0, pose.rotations, offset);
     this.isPredicted = isPredicted;
     if (isPredicted) pose.rotations.set(joints, offset);
     correction.apply(pose.rotations, offset);
-    if ((isHeldByOther || isBonded) && this.hasLeftMotion) {
+    if (isShown && this.hasLeftMotion) {
       this.hasLeftMotion = false;
       controlled.reset();
     }

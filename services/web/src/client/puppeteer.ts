@@ -2,13 +2,15 @@
 
 import { MAX_HAND_SPEED, MAX_LEG_SPEED } from "../marionette/constants";
 import { LIMBS } from "../motion/skeleton";
-import { limbNumber, MAX_LIMBS } from "../wire/limbs";
-import type { Grant, Message, Notice, Presence, Refusal } from "../wire/messages";
+import { isHand, limbNumber, MAX_LIMBS } from "../wire/limbs";
+import type { BondEnd, Grant, Message, Notice, Presence, Refusal } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
+import { BondPredictor } from "./bond-predictor";
+import { BondRequests, type LimbPair, orderedPair } from "./bond-requests";
 import { INPUT_INTERVAL_MS, type InputValues, LimbHold } from "./limb-hold";
 import { MAX_TARGET_REACH, THIGH_RANGE } from "./limb-target";
-import type { LimbPredictor } from "./performer-view";
-import type { PredictionFrame } from "./predicted-limb";
+import type { LimbPredictor, StagedFrame } from "./performer-view";
+import type { LimbHolder } from "./predicted-bond";
 import { ReconnectingConnection } from "./reconnecting-connection";
 import type { Viewer } from "./viewer";
 
@@ -61,6 +63,12 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
   private readonly now: () => number;
   private readonly connection: Pick<ReconnectingConnection, "send" | "close" | "bufferedBytes" | "tryReplacement">;
   private readonly limbHolds: readonly LimbHold[];
+  private readonly bondRequests = new BondRequests();
+  private listedBonds: readonly LimbPair[] = [];
+  private readonly bondPredictor = new BondPredictor((limb) => ({
+    prediction: this.limbHolds[limb].prediction,
+    holder: this.holderOf(limb),
+  }));
   private readonly sendTimer: ReturnType<typeof setInterval>;
   private readonly tryReplacement = () => this.connection.tryReplacement();
 
@@ -99,7 +107,7 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     const hold = this.limbHolds[limb];
     if (hold.state === "free") return;
     if (hold.state === "granted") this.connection.send({ name: "Release", limb, epoch: hold.epoch });
-    hold.release();
+    this.endHold(hold);
   }
 
   /** Ask the holder of a limb for it. It is granted without a claim, or the request lapses. */
@@ -133,16 +141,25 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
   }
 
   /**
-   * Bond two hands, so that their tips stay together: one held here, the other as well, or free. The session answers
-   * with a new `presence`, or with "bondend".
+   * Bond two hands, so that their tips stay together: one held here, the other as well, or free. They are shown so at
+   * once. The session answers with a new `presence`, or with "bondend". After a loss of the connection the bond is
+   * requested again, as its limbs are claimed again.
    */
   bond(limb: number, other: number): void {
-    this.connection.send({ name: "Bond", limbs: [limb, other], wanted: true });
+    const pair = orderedPair(limb, other);
+    if (!this.connection.send({ name: "Bond", limbs: [limb, other], wanted: true })) return;
+    // a refusal that is certain is not shown as a bond
+    if (limb === other || !pair.every((hand) => isHand(hand) && hand < MAX_LIMBS)) return;
+    const holders = pair.map((hand) => this.holderOf(hand));
+    if (holders.includes("other") || !holders.includes("own")) return;
+    this.bondRequests.request(pair, this.now());
+    this.bondPredictor.load();
   }
 
   /** End the bond of two hands; those that are held stay so. */
   unbond(limb: number, other: number): void {
     this.connection.send({ name: "Bond", limbs: [limb, other], wanted: false });
+    this.endBond(orderedPair(limb, other));
   }
 
   /** Return true if the session has granted the limb. */
@@ -169,12 +186,14 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     this.sendInput(hold, this.now());
   }
 
-  applyOwnLimbs(frame: PredictionFrame): number {
+  applyOwnLimbs(frame: StagedFrame): number {
+    const bonded = this.bondPredictor.predict(frame, this.effectiveBonds());
     let predicted = 0;
     for (let nth = 0; nth < LIMBS.length; nth++) {
-      const { prediction, holder } = this.limbHolds[limbNumber(frame.performer, nth)];
-      const isHeldByOther = holder !== null && holder !== this.id;
-      if (prediction.apply(frame, isHeldByOther, this.isBonded(prediction.limb))) predicted |= 1 << nth;
+      const limb = limbNumber(frame.performer, nth);
+      const { prediction } = this.limbHolds[limb];
+      const isHeldByOther = this.holderOf(limb) === "other";
+      if (prediction.apply(frame, isHeldByOther, bonded.get(limb) ?? null)) predicted |= 1 << nth;
     }
     return predicted;
   }
@@ -190,6 +209,8 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
       case "Welcome":
         this.id = message.id;
         this.colour = message.colour;
+        // a replaced connection was not lost before
+        this.bondRequests.disconnect();
         this.reclaimAll();
         this.dispatchEvent(new Event("welcome"));
         break;
@@ -197,7 +218,7 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
         this.onPresence(message);
         break;
       case "BondEnd":
-        this.dispatchEvent(new CustomEvent("bondend", { detail: { limbs: message.limbs, reason: message.reason } }));
+        this.onBondEnd(message);
         break;
       case "Notice":
         this.onNotice(message);
@@ -218,6 +239,9 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
 
   private onPresence(message: Presence): void {
     this.presence = message;
+    this.listedBonds = (message.bonds ?? []).map(([limb, other]) => orderedPair(limb, other));
+    this.bondRequests.confirm(this.listedBonds);
+    if (this.listedBonds.length > 0) this.bondPredictor.load();
     for (const hold of this.limbHolds) {
       hold.holder = message.limbs[hold.limb] ?? null;
       if (hold.askState !== "none") this.updateAsk(hold, message);
@@ -252,8 +276,19 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     }
     hold.holder = this.id;
     hold.grant(epoch, this.now());
+    if (isHand(limb)) this.bondPredictor.load();
     this.sendInput(hold, this.now());
+    for (const [first, other] of this.bondRequests.takeLost(limb, this.limbHolds, this.now()))
+      this.connection.send({ name: "Bond", limbs: [first, other], wanted: true });
     this.dispatchEvent(new CustomEvent("grant", { detail: { limb, asked } }));
+  }
+
+  private onBondEnd({ limbs, reason }: BondEnd): void {
+    const pair = orderedPair(limbs[0], limbs[1]);
+    this.bondRequests.applyEnd(pair, reason, this.limbHolds);
+    // it ends here, before the next presence
+    this.listedBonds = this.listedBonds.filter((listed) => String(listed) !== String(pair));
+    this.dispatchEvent(new CustomEvent("bondend", { detail: { limbs, reason } }));
   }
 
   private onNotice({ limb, reason, detail }: Notice): void {
@@ -269,13 +304,14 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
       return;
     }
     hold.holder = holder;
-    hold.release();
+    this.endHold(hold);
     this.dispatchEvent(new CustomEvent("refusal", { detail: { limb, reason, holder } }));
   }
 
   private onClosed(reason: string, final: boolean): void {
     this.id = null;
     this.isClosed = final;
+    this.bondRequests.disconnect();
     for (const hold of this.limbHolds) {
       hold.holder = null;
       hold.revoke();
@@ -288,6 +324,29 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
       this.viewer.removeEventListener("replaced", this.tryReplacement);
     }
     this.dispatchEvent(new CustomEvent("closed", { detail: reason }));
+  }
+
+  /** End claim and grant of a limb, and with them its bonds. */
+  private endHold(hold: LimbHold): void {
+    hold.release();
+    for (const pair of this.effectiveBonds()) if (pair.includes(hold.limb)) this.endBond(pair);
+  }
+
+  private endBond(pair: LimbPair): void {
+    this.bondRequests.end(
+      pair,
+      this.listedBonds.some((listed) => String(listed) === String(pair)),
+    );
+  }
+
+  private effectiveBonds(): readonly LimbPair[] {
+    return this.bondRequests.effective(this.listedBonds, this.now());
+  }
+
+  private holderOf(limb: number): LimbHolder {
+    const { prediction, holder } = this.limbHolds[limb];
+    if (holder !== null && holder !== this.id) return "other";
+    return prediction.target.isHeld ? "own" : null;
   }
 
   /** Send due inputs and keep-alive messages, and expire requests. */

@@ -25,7 +25,7 @@ import {
   SHARE_HALF_LIFE_S,
 } from "./constants";
 import { pathTo } from "./follower";
-import { add, distanceOf, lengthOf, ORIGIN, type Point, rotated, scaled, subtract, unitOr } from "./point";
+import { add, distanceOf, dotOf, lengthOf, ORIGIN, type Point, rotated, scaled, subtract, unitOr } from "./point";
 import { brakingSpeed, keepWithin, limitChange, steer, wallBefore } from "./steering";
 
 /** Distance and speed below which a hand counts as joined to the pair. */
@@ -70,6 +70,8 @@ export class Bond {
   private unitM: number;
   private point: Point;
   private velocity: Point = ORIGIN;
+  /** Spread of both shoulders' frames at the pair, in the last frame. */
+  private spread: Point = ORIGIN;
   private readonly offsets: [Point, Point];
   private readonly offsetVelocities: [Point, Point] = [ORIGIN, ORIGIN];
   /** Velocities relative to each hand's own shoulder, until the first step. */
@@ -120,8 +122,8 @@ export class Bond {
     if (seconds <= 0) return true;
     const carrier = new Carrier(this.shoulders, shoulders, newShare);
     // the same velocity, seen from the frame that is carried with the new weights
-    const faster = subtract(carrier.slip(0, this.point, seconds), carrier.slip(1, this.point, seconds));
-    this.velocity = add(this.velocity, scaled(faster, this.share - newShare));
+    this.velocity = add(this.velocity, scaled(this.spread, this.share - newShare));
+    this.spread = carrier.spread(this.point, seconds);
     this.share = newShare;
     if (this.ownVelocities) this.beginMoving(this.ownVelocities, shells, carrier, seconds);
     this.ownVelocities = null;
@@ -133,6 +135,15 @@ export class Bond {
     this.reduceOffset(0, begin, carrier, seconds);
     this.reduceOffset(1, begin, carrier, seconds);
     return true;
+  }
+
+  /** Move the joined pair to a position next to its own, where the shoulders' limits keep it. */
+  stayAt(position: Point): void {
+    const moved = subtract(position, this.point);
+    if (lengthOf(moved) === 0) return;
+    this.point = position;
+    const back = unitOr(moved, ORIGIN);
+    this.velocity = subtract(this.velocity, scaled(back, Math.min(dotOf(this.velocity, back), 0)));
   }
 
   private mean(first: Point, second: Point): Point {
@@ -148,7 +159,7 @@ export class Bond {
     const velocities = bySide((side) => add(own[side], carrier.slip(side, positions[side], seconds)));
     const mean = rotated(carrier.rotation, this.mean(...velocities));
     const maxChange = 0.5 * HAND_ACCELERATION * unitM * seconds;
-    const gaps = carrier.border(shells, seconds)(carrier.move(this.point));
+    const gaps = carrier.border(shells, seconds).gaps(carrier.move(this.point));
     const within = keepWithin(
       mean,
       gaps.map((gap) => wallBefore(gap, maxChange, seconds)),

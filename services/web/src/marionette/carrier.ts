@@ -74,6 +74,11 @@ export class Carrier {
     return rotated(inverse(this.rotation), scaled(subtract(this.follow(side, point), this.move(point)), 1 / seconds));
   }
 
+  /** Return the velocity of a point at rest in the first shoulder's frame, seen from the second's. */
+  spread(point: Point, seconds: number): Point {
+    return scaled(subtract(this.follow(0, point), this.follow(1, point)), 1 / seconds);
+  }
+
   /** Return the velocity of one shoulder in the carried frame. */
   drift(side: 0 | 1, seconds: number): Point {
     return scaled(subtract(this.now[side].position, this.move(this.before[side].position)), 1 / seconds);

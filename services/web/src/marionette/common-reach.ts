@@ -98,19 +98,32 @@ export interface Gap {
   readonly retreat: number;
 }
 
-/** Function that returns the gaps of a point to the surfaces of a border. */
-export type Border = (point: Point) => Gap[];
+/** Border that a point must not pass. */
+export interface Border {
+  /** Return the gaps of a point to the surfaces. */
+  gaps(point: Point): Gap[];
+  /** Return a velocity shortened so that `acceleration` suffices to follow the outer spheres at it. */
+  limitSpeed(velocity: Point, acceleration: number): Point;
+}
 
 /** Return the border of a shell that moves at the velocity `drift`: both its spheres. */
 export function shellBorder(shell: Shell, drift: Point): Border {
-  return (point) => {
-    const outward = unitOr(subtract(point, shell.centre), DOWN);
-    const inward = scaled(outward, -1);
-    const [beyond, within] = excesses(shell, point);
-    return [
-      { distance: -beyond, normal: outward, retreat: dotOf(drift, outward) },
-      { distance: -within, normal: inward, retreat: dotOf(drift, inward) },
-    ];
+  return {
+    gaps(point) {
+      const outward = unitOr(subtract(point, shell.centre), DOWN);
+      const inward = scaled(outward, -1);
+      const [beyond, within] = excesses(shell, point);
+      return [
+        { distance: -beyond, normal: outward, retreat: dotOf(drift, outward) },
+        { distance: -within, normal: inward, retreat: dotOf(drift, inward) },
+      ];
+    },
+    limitSpeed(velocity, acceleration) {
+      const relative = subtract(velocity, drift);
+      const speed = lengthOf(relative),
+        most = Math.sqrt(acceleration * shell.outer);
+      return speed <= most ? velocity : add(drift, scaled(relative, most / speed));
+    },
   };
 }
 
@@ -122,8 +135,10 @@ export function shellBorder(shell: Shell, drift: Point): Border {
  */
 export function commonBorder([first, second]: readonly [Shell, Shell], drifts: readonly [Point, Point]): Border {
   const borders = [shellBorder(first, drifts[0]), shellBorder(second, drifts[1])];
-  return (point) => {
-    const gaps = borders.flatMap((border) => border(point));
+  const limitSpeed = (velocity: Point, acceleration: number) =>
+    borders.reduce((limited, border) => border.limitSpeed(limited, acceleration), velocity);
+  const gapsOf = (point: Point) => {
+    const gaps = borders.flatMap((border) => border.gaps(point));
     const between = subtract(second.centre, first.centre);
     const distance = lengthOf(between);
     if (distance < 1e-12) return gaps;
@@ -140,4 +155,5 @@ export function commonBorder([first, second]: readonly [Shell, Shell], drifts: r
     gaps.push({ distance: radius - lengthOf(away), normal, retreat: dotOf(centreDrift, normal) + growth });
     return gaps;
   };
+  return { gaps: gapsOf, limitSpeed };
 }

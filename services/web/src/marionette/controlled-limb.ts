@@ -9,6 +9,7 @@ import type { Numbers } from "../motion/rotation";
 import type { Figure } from "../motion/skeleton";
 import { addScaled, distanceBetween, length } from "../motion/vector";
 import { ArmBlend } from "./blend";
+import type { HandMotion } from "./bond";
 import {
   ARRIVAL_TOLERANCE,
   HAND_ACCELERATION,
@@ -23,6 +24,7 @@ import { Elbow, liftAngle } from "./elbow";
 import { Follower } from "./follower";
 import { DirectionAlignment, JointBlend, returnAcceleration } from "./handover";
 import { ArmRig, LegRig } from "./limb-rig";
+import { add, type Point, scaled } from "./point";
 
 const ZERO_VELOCITY = new Float64Array(3);
 
@@ -138,9 +140,8 @@ export class ControlledHand extends ControlledLimb {
     weight: number,
     seconds: number,
   ): boolean {
-    const { rig, elbow, motionPosition: own, direction, up, target, bent, around } = this;
+    const { rig, motionPosition: own } = this;
     const { minTipDistance: inner } = rig.arm,
-      at = 4 * rig.firstJointIndex,
       follower = this.ensureFollower(),
       hand = follower.position;
     if (goal) {
@@ -161,12 +162,65 @@ export class ControlledHand extends ControlledLimb {
       );
       if (weight <= 0 && distanceBetween(hand, 0, own, 0) < ARRIVAL_TOLERANCE) return false;
     }
-    if (!elbow.hasBegun) {
-      rig.jointPositions(this.jointPoints, 0, rotations, at);
-      rig.targetDirection(direction, 0, own, 0);
-      rig.planeNormal(this.axis, 0, rotations, at);
-      elbow.begin(direction, this.axis, liftAngle(this.jointPoints, direction));
-    }
+    this.solveAt(out, outAt, rotations, hand, weight, seconds);
+    return true;
+  }
+
+  /** Return where the hand is `seconds` after the last call of `solveJoints` if nothing moves it. */
+  nextMotion(seconds: number): HandMotion {
+    const { follower } = this;
+    const velocity = pointOf(follower ? follower.velocity : this.velocity);
+    if (!follower) return { place: pointOf(this.motionPosition), velocity };
+    return { place: add(pointOf(follower.position), scaled(velocity, seconds)), velocity };
+  }
+
+  /** Return the place next to `place` that the arm reaches in the next `seconds`, within the shoulder's limit. */
+  reachablePlace(rotations: Numbers, place: Point, seconds: number): Point {
+    const { rig, direction, up, target } = this;
+    this.beginElbow(rotations);
+    target.set(place);
+    rig.targetDirection(direction, 0, target, 0);
+    rig.localUp(up, 0, rotations);
+    return pointOf(this.elbow.preview(direction, length(target, 0), up, seconds).tip);
+  }
+
+  /** Write the arm's joints as `solveJoints` does, with the hand moved to the place that its bond gives. */
+  solveBondedJoints(
+    out: Numbers,
+    outAt: number,
+    rotations: Numbers,
+    place: Point,
+    weight: number,
+    seconds: number,
+  ): void {
+    this.returnAcceleration = null;
+    const follower = this.ensureFollower();
+    follower.moveTo(place, seconds);
+    this.solveAt(out, outAt, rotations, follower.position, weight, seconds);
+  }
+
+  private beginElbow(rotations: Numbers): void {
+    const { rig, elbow, direction } = this;
+    if (elbow.hasBegun) return;
+    const at = 4 * rig.firstJointIndex;
+    rig.jointPositions(this.jointPoints, 0, rotations, at);
+    rig.targetDirection(direction, 0, this.motionPosition, 0);
+    rig.planeNormal(this.axis, 0, rotations, at);
+    elbow.begin(direction, this.axis, liftAngle(this.jointPoints, direction));
+  }
+
+  /** Write the arm's joints with the tip at `hand` (3), or next to it within the shoulder's limit. */
+  private solveAt(
+    out: Numbers,
+    outAt: number,
+    rotations: Numbers,
+    hand: Numbers,
+    weight: number,
+    seconds: number,
+  ): void {
+    const { rig, elbow, motionPosition: own, direction, up, target, bent, around } = this;
+    const at = 4 * rig.firstJointIndex;
+    this.beginElbow(rotations);
     rig.targetDirection(direction, 0, hand, 0);
     rig.localUp(up, 0, rotations);
     const { tip, normal, bend } = elbow.step(direction, length(hand, 0), up, seconds);
@@ -187,12 +241,15 @@ export class ControlledHand extends ControlledLimb {
       Math.max(weight, MIN_SOLVE_WEIGHT),
       seconds,
     );
-    return true;
   }
 
   override placeInPose(out: Numbers, rotations: Numbers): void {
     this.rig.tipTarget(out, 0, rotations, 4 * this.rig.firstJointIndex);
   }
+}
+
+function pointOf(numbers: Numbers): Point {
+  return [numbers[0], numbers[1], numbers[2]];
 }
 
 /** One leg of a figure. */

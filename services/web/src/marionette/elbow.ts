@@ -184,6 +184,17 @@ export class Elbow {
     return configuration;
   }
 
+  /** Return what `step` would return, without effect. The next call of either overwrites the result. */
+  preview(direction: Numbers, reach: number, up: Numbers, seconds: number): ArmConfiguration {
+    const { lift, hasLastUpperArm } = this;
+    const earlier = [this.direction, this.normal, this.lastUpperArm].map((state) => state.slice());
+    const configuration = this.step(direction, reach, up, seconds);
+    [this.direction, this.normal, this.lastUpperArm].forEach((state, nth) => state.set(earlier[nth]));
+    this.lift = lift;
+    this.hasLastUpperArm = hasLastUpperArm;
+    return configuration;
+  }
+
   private setNormal(normal: Numbers, direction: Numbers): void {
     rejectFrom(this.normal, 0, normal, 0, direction, 0);
     if (!unit(this.normal, 0, this.normal, 0)) anyPerpendicular(this.normal, 0, direction, 0);

@@ -93,6 +93,14 @@ export class Follower {
     clampDistance(position, minDistance, maxDistance);
     for (let i = 0; i < 3; i++) velocity[i] = (position[i] - before[i]) / seconds;
   }
+
+  /** Move to a position (3) that was computed otherwise, in `seconds`; the next step begins with that velocity. */
+  moveTo(target: ArrayLike<number>, seconds: number): void {
+    const { position, velocity } = this;
+    if (seconds > 0) for (let i = 0; i < 3; i++) velocity[i] = (target[i] - position[i]) / seconds;
+    position.set(target);
+    this.hasPreviousTarget = this.hadFrameVelocity = false;
+  }
 }
 
 const aside = new Float64Array(3);

@@ -1,12 +1,12 @@
 /**
  * Limbs of a figure: from a target to the local rotations of three joints, and back. The target of a hand is its
  * tip in the shoulder's frame (axes of vl5), in arm lengths; the target of a leg is the thigh's angle from
- * straight down in the vertical plane that the hips face. Gravity is the world's. No method allocates. Python:
- * `marionette/limb_rig.py`.
+ * straight down in the vertical plane that the hips face. Gravity is the world's. Only `shoulderFrame` allocates.
+ * Python: `marionette/limb_rig.py`.
  */
 
 import { conjugate, multiply, type Numbers, rotate } from "../motion/rotation";
-import type { Figure } from "../motion/skeleton";
+import type { Figure, Pose } from "../motion/skeleton";
 import {
   anyPerpendicular,
   combine,
@@ -24,6 +24,7 @@ import { Arm } from "./arm";
 import { MAX_WRIST_BEND_RAD } from "./constants";
 import { elevation, verticalNormal } from "./elbow";
 import { clampThigh, kneeBend } from "./leg";
+import type { Point } from "./point";
 import { type Proportions, proportionsFromLinks } from "./proportions";
 import { ShoulderLimit } from "./shoulder";
 
@@ -72,6 +73,9 @@ export class ArmRig {
   readonly shoulder: ShoulderLimit;
   private readonly restFrames = new Float64Array(12);
   private readonly palmTurnRad: number;
+  /** Offsets (3) at rest, metres: of vl5 from the root, and of the shoulder from vl5. */
+  private readonly trunk: Float64Array;
+  private readonly shoulderOffset: Float64Array;
   private readonly angles = new Float64Array(3);
   private readonly columns = new Float64Array(9);
   private readonly turn = new Float64Array(4);
@@ -88,6 +92,8 @@ export class ArmRig {
     this.shoulder = new ShoulderLimit(limb === 1);
     for (let link = 0; link < 3; link++) boneFrame(this.restFrames, 4 * link, this.bones, 3 * link);
     this.palmTurnRad = limb === 0 ? Math.PI / 2 : -Math.PI / 2;
+    this.trunk = figure.offsets.slice(3 * VL5_INDEX, 3 * VL5_INDEX + 3);
+    this.shoulderOffset = figure.offsets.slice(3 * this.firstJointIndex, 3 * this.firstJointIndex + 3);
   }
 
   /** Write the world's up (3) in the shoulder's frame, for a pose's 18 rotations. */
@@ -95,6 +101,18 @@ export class ArmRig {
     multiply(this.turn, 0, rotations, 0, rotations, 4 * VL5_INDEX);
     conjugate(this.turn, 0, this.turn, 0);
     rotate(out, outAt, this.turn, 0, UP, 0);
+  }
+
+  /** Return position (metres) and orientation (4) of the shoulder's frame in a pose. */
+  shoulderFrame({ root, rotations }: Pose): { position: Point; rotation: Float64Array } {
+    const rotation = new Float64Array(4),
+      trunk = new Float64Array(3),
+      offset = new Float64Array(3);
+    rotate(trunk, 0, rotations, 0, this.trunk, 0);
+    multiply(rotation, 0, rotations, 0, rotations, 4 * VL5_INDEX);
+    rotate(offset, 0, rotation, 0, this.shoulderOffset, 0);
+    const at = (axis: number) => root[axis] + trunk[axis] + offset[axis];
+    return { position: [at(0), at(1), at(2)], rotation };
   }
 
   /** Write elbow, wrist and tip (9) relative to the shoulder, in metres on the axes of vl5. */

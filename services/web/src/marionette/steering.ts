@@ -30,13 +30,15 @@ export function steer(
   maxFreeChange = Infinity,
 ): Point {
   const freeChange = Math.min(maxChange, maxFreeChange);
-  let walls = border(start).map((gap) => wallBefore(gap, 0.5 * maxChange, seconds));
+  let walls = border.gaps(start).map((gap) => wallBefore(gap, 0.5 * maxChange, seconds));
+  // the other half of the change is for the curvature of the border
+  const limitedAim = border.limitSpeed(aim, (0.5 * maxChange) / seconds);
   let velocity = before;
   for (let round = 0; round < WALL_ROUNDS; round++) {
     const forced = limitChange(before, keepWithin(before, walls), maxChange);
-    velocity = spendChange(before, forced, keepWithin(aim, walls), freeChange);
+    velocity = spendChange(before, forced, keepWithin(limitedAim, walls), freeChange);
     // a border is curved: a point that moves along it leaves it
-    const gaps = border(add(start, scaled(velocity, seconds)));
+    const gaps = border.gaps(add(start, scaled(velocity, seconds)));
     if (Math.min(...gaps.map(({ distance }) => distance)) >= -TOLERANCE) break;
     walls = walls.map(({ normal, speed }, nth) => ({
       normal,

@@ -141,3 +141,15 @@ test("target of a bonded hand follows the pair once there was no input for a sec
   target.follow(place, 3_000);
   expectNear(target.valueAt(1_400), [0.4, 0.3, 0.4]);
 });
+
+test("age of an input starts with the claim and is zero while the limb moves", () => {
+  const target = new LimbTarget(0);
+  target.claim(100);
+  expect(target.inputAgeS(350)).toBe(0.25);
+  target.setTarget(0.3, 0, 0, 400);
+  expect(target.inputAgeS(900)).toBe(0.5);
+  target.setVelocity(1, 0, 0, 1_000);
+  expect(target.inputAgeS(5_000)).toBe(0);
+  target.setVelocity(0, 0, 0, 5_000);
+  expect(target.inputAgeS(6_000)).toBe(1);
+});

@@ -1,6 +1,6 @@
 import { expect, test, vi } from "vitest";
 import type { LimbSolver } from "../../src/client/marionette-solver";
-import { type FrameContext, PerformerView } from "../../src/client/performer-view";
+import { type FrameContext, PerformerView, type StagedFrame } from "../../src/client/performer-view";
 import { SolverLoader } from "../../src/client/solver-loader";
 import { decodeMotionBlock } from "../../src/codec/motion-decoder";
 import { MotionTrack } from "../../src/codec/motion-track";
@@ -15,7 +15,7 @@ const track = MotionTrack.fromDescription({ ...goldenDescription(), front: 0.25,
 
 /** Return the context of a frame without a predictor. */
 function frame(clock: number, overlays = new OverlayBuffer()): FrameContext {
-  return { clock, nowMs: 0, overlays, predictor: null };
+  return { clock, nowMs: 0, overlays, predictor: null, partner: () => null };
 }
 
 /** Create performer `number` of the golden motion at another placement. */
@@ -91,4 +91,40 @@ test("solver is created once, at the first pose", async () => {
   view.loadSolver();
   await Promise.resolve();
   expect(createSolver).toHaveBeenCalledTimes(1);
+});
+
+test("frame for another performer's prediction leaves the drawn pose as it is", async () => {
+  const { store, view } = createView(1);
+  const context = frame(0);
+  expect(view.partnerFrame(context)).toBeNull();
+  store.put(0, 1, block);
+  view.seek(500_000, true, 2_600_000);
+  // the solver is created asynchronously
+  await vi.waitFor(() => expect(view.partnerFrame(context)).not.toBeNull());
+  const drawn = view.pose(context)!,
+    before = structuredClone(drawn);
+  view.seek(750_000, true, 2_600_000);
+  const partner = view.partnerFrame(context)!;
+  expect(drawn).toEqual(before);
+  expect([partner.performer, partner.placement]).toEqual([1, view.placement]);
+  // the predicted pose is that of the motion, not placed
+  expect(partner.pose.root).toEqual(partner.motion.root);
+  expect(partner.pose.root).not.toEqual(before.root);
+  expect(partner.partner(0)).toBeNull();
+});
+
+test("predictor gets the frames of the other performers at the same instant", async () => {
+  const [first, second] = [createView(0), createView(1)];
+  for (const { store, view } of [first, second]) {
+    store.put(0, 1, block);
+    view.seek(500_000, true, 2_600_000);
+  }
+  const applyOwnLimbs = vi.fn(() => 0b10);
+  const context = { ...frame(0), predictor: { applyOwnLimbs }, partner: () => second.view };
+  await vi.waitFor(() => {
+    first.view.pose(context);
+    expect(applyOwnLimbs).toHaveBeenCalled();
+  });
+  const [[own]] = applyOwnLimbs.mock.calls as unknown as [[StagedFrame]];
+  expect([own.performer, own.partner(1)?.performer, first.view.controlledLimbs]).toEqual([0, 1, 0b10]);
 });

@@ -53,7 +53,7 @@ class SimulatedStage {
     if (overlay) this.pose.rotations.set(overlay, first);
     const overlaidMask = overlay ? 1 << limb : 0;
     const frame = { performer: 0, pose: this.pose, motion: this.motion, overlaidMask, nowMs: this.now };
-    this.prediction.apply({ ...frame, solver: this.solver }, this.isHeldByOther, this.isBonded);
+    this.prediction.apply({ ...frame, solver: this.solver }, this.isHeldByOther, this.isBonded ? "shown" : null);
     for (let joint = 0; joint < 72; joint += 4) {
       const motionStep = rotationAngle(this.motion.rotations, joint, motion.rotations, joint);
       const step = rotationAngle(this.pose.rotations, joint, pose.rotations, joint);

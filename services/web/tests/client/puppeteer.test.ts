@@ -160,6 +160,54 @@ describe("a bond of two hands", () => {
     expect(puppeteer.isBonded(0)).toBe(false);
   });
 
+  test("is requested again after a reconnect, once its hands are granted again", () => {
+    for (const limb of [0, 1]) {
+      puppeteer.claim(limb);
+      socket.receive({ name: "Grant", limb, epoch: 3 });
+    }
+    puppeteer.bond(1, 0);
+    presence([[0, 1]]);
+    socket.endWith(1006);
+    advanceTime(250);
+    socket = FakeWebSocket.last;
+    socket.accept();
+    socket.receive({ name: "Welcome", id: "a9", colour: 0, lead: 100_000 });
+    presence(null);
+    socket.receive({ name: "Grant", limb: 0, epoch: 4 });
+    expect(socket.messagesOf("Bond")).toEqual([]);
+    socket.receive({ name: "Grant", limb: 1, epoch: 4 });
+    expect(socket.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [0, 1], wanted: true }]);
+  });
+
+  test("is requested again on a connection that replaces another", () => {
+    puppeteer.claim(0);
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
+    puppeteer.bond(0, 1);
+    presence([[0, 1]]);
+    viewer.dispatchEvent(new Event("replaced"));
+    socket = FakeWebSocket.last;
+    socket.accept();
+    socket.receive({ name: "Welcome", id: "b2", colour: 3, lead: 100_000 }, { name: "Grant", limb: 0, epoch: 4 });
+    expect(socket.messagesOf("Bond")).toEqual([{ name: "Bond", limbs: [0, 1], wanted: true }]);
+  });
+
+  test("that was lost with its hand is requested again, one that was let go is not", () => {
+    puppeteer.claim(0);
+    socket.receive({ name: "Grant", limb: 0, epoch: 3 });
+    puppeteer.bond(0, 1);
+    presence([[0, 1]]);
+    socket.receive(
+      { name: "Refusal", limb: 0, reason: "lost", holder: null },
+      { name: "BondEnd", limbs: [0, 1], reason: "lost" },
+      { name: "Grant", limb: 0, epoch: 4 },
+    );
+    expect(socket.messagesOf("Bond")).toHaveLength(2);
+    puppeteer.unbond(0, 1);
+    expect(socket.messagesOf("Bond")).toHaveLength(3);
+    socket.receive({ name: "Refusal", limb: 0, reason: "lost", holder: null }, { name: "Grant", limb: 0, epoch: 5 });
+    expect(socket.messagesOf("Bond")).toHaveLength(3);
+  });
+
   test("reports its end with the reason", () => {
     const ends: unknown[] = [];
     puppeteer.addEventListener("bondend", (event) => ends.push((event as CustomEvent).detail));

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import { Carrier, inverse, type Shoulder, toPlace, toWorld } from "../../src/marionette/carrier";
-import { distanceOf, lengthOf, ORIGIN, type Point, rotated } from "../../src/marionette/point";
+import { distanceOf, lengthOf, ORIGIN, type Point, rotated, subtract } from "../../src/marionette/point";
 import { fromCoordinateAxis } from "../../src/motion/vector";
 
 function shoulder(position: Point, turn = 0): Shoulder {
@@ -38,5 +38,14 @@ test("the whole share follows one shoulder, and the other drifts", () => {
     { centre: ORIGIN, inner: 0.1, outer: 0.6 },
     { centre: [0.8, 0, 0] as const, inner: 0.1, outer: 0.6 },
   ] as const;
-  expect(carrier.border(shells, 0.1)([0.4, 0, 0])).toHaveLength(5);
+  expect(carrier.border(shells, 0.1).gaps([0.4, 0, 0])).toHaveLength(5);
+});
+
+test("the spread is the difference of both slips", () => {
+  const before = [shoulder(ORIGIN), shoulder([0.7, 0, 0], 3)] as const;
+  const carrier = new Carrier(before, [shoulder([0.1, 0, 0], 0.2), shoulder([0.6, 0.1, 0], 2.9)], 0.3);
+  const [first, second] = ([0, 1] as const).map((side) =>
+    rotated(carrier.rotation, carrier.slip(side, [0.2, 0.3, 0.4], 0.1)),
+  );
+  expect(distanceOf(carrier.spread([0.2, 0.3, 0.4], 0.1), subtract(first, second))).toBeLessThan(1e-12);
 });

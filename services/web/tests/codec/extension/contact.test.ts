@@ -20,6 +20,10 @@ test.each(golden.invalid)("a block with $why is refused", ({ block, index }) => 
   expect(() => decodeContactBlock(decodeBase64(block), tracks[0].framesIn(index))).toThrow(DamagedBlock);
 });
 
+test.each([true, false, 0.5, "0", -1])("a track of performer %j is refused", (performer) => {
+  expect(() => ContactTrack.fromDescription({ ...golden.tracks[0], performer })).toThrow(/index/);
+});
+
 test.each(golden.invalid_tracks)("a track with $why is refused", ({ track }) => {
   expect(() => ContactTrack.fromDescription(track)).toThrow(DamagedBlock);
 });

@@ -27,6 +27,11 @@ test.each(golden.invalid_tracks)("description with $why is refused", ({ track })
   expect(() => goldenExtensionTrack(track)).toThrow(DamagedBlock);
 });
 
+test.each([true, false, 0.5, "0", -1])("description of performer %j is refused", (performer) => {
+  const joints = decodeBase64(golden.tracks[0].joints as string);
+  expect(() => ExtensionTrack.fromDescription({ ...golden.tracks[0], joints, performer })).toThrow(/index/);
+});
+
 test("description without timing is refused", () => {
   const joints = decodeBase64(golden.tracks[0].joints as string);
   expect(() => ExtensionTrack.fromDescription({ ...golden.tracks[0], joints, frames: 0 })).toThrow(DamagedBlock);
