@@ -49,6 +49,7 @@ describe("start", () => {
       name: "Presence",
       live: null,
       bonds: null,
+      crowd: null,
       viewers: 1,
       puppeteers: [],
       limbs: [null, null, null, null],

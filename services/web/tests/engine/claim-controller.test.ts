@@ -84,7 +84,7 @@ test("limbs can be claimed once the stage and the connection are there", () => {
 /** Send a presence message on both connections. */
 function sendPresence(limbs: (string | null)[], asks: string[][] = [[], [], [], []]): void {
   for (const socket of [stream, control])
-    socket.receive({ name: "Presence", live: null, bonds: null, viewers: 2, puppeteers: PEOPLE, limbs, asks });
+    socket.receive({ name: "Presence", live: null, bonds: null, crowd: null, viewers: 2, puppeteers: PEOPLE, limbs, asks });
 }
 
 describe("limb held by another user", () => {
@@ -257,6 +257,7 @@ describe("joined hands", () => {
       name: "Presence",
       live: null,
       bonds,
+      crowd: null,
       viewers: 1,
       puppeteers: PEOPLE,
       limbs,
