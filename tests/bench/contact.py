@@ -14,11 +14,13 @@ from pathlib import Path
 from typing import Any
 
 from tests.bench.contact_bonds import SCENES, measure_bonds
+from tests.bench.contact_crowd import measure_crowd
 from tests.bench.contact_feet import measure_feet
 
 PARTS: dict[str, Callable[[Path, int], dict[str, Any]]] = {
     "feet": lambda shared, _: measure_feet(shared),
     "bonds": lambda _, scenes: measure_bonds(scenes, os.cpu_count() or 1),
+    "crowd": lambda _, __: measure_crowd(),
 }
 """Parts by name: functions of the folder of the recorded clips and the number of scenes."""
 

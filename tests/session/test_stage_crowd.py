@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
@@ -17,7 +18,8 @@ from bunraku.session.schema import SessionEdit
 from bunraku.session.session_registry import SessionRecord
 from bunraku.session.stage import SessionStart, Stage
 from bunraku.stream.crowd_relay import CrowdRelay
-from bunraku.wire.messages import Overlay, Presence, Pull, unpack
+from bunraku.wire.messages import Presence, Pull, unpack
+from bunraku.wire.overlay import Overlay
 from tests.session.joined_stage import StageMessages, stored_motion
 from tests.virtual_time import run_in_virtual_time
 
@@ -35,7 +37,7 @@ def test_pulls_of_two_replicas_move_an_open_limb_and_are_logged() -> None:
         audience = StageMessages(bus)
         relays = [CrowdRelay(name, clock, lambda data: bus.publish("session.s.crowd", data)) for name in "ab"]
         for relay in relays:
-            bus.subscribe("session.s.presence", lambda data, to=relay: to.set_presence(_presence(data)))
+            bus.subscribe("session.s.presence", partial(_forward_presence, relay))
             relay.set_presence(stage.presence)
         for _ in range(20):
             for member in range(6):
@@ -62,10 +64,10 @@ def test_pulls_of_two_replicas_move_an_open_limb_and_are_logged() -> None:
     assert np.ptp(joints, axis=0).max() > 1_000
 
 
-def _presence(data: bytes) -> Presence:
+def _forward_presence(relay: CrowdRelay, data: bytes) -> None:
     presence = unpack(data)
     assert isinstance(presence, Presence)
-    return presence
+    relay.set_presence(presence)
 
 
 def test_edit_opens_and_closes_limbs_by_name_and_number() -> None:
