@@ -97,6 +97,30 @@ async def test_two_viewers_of_a_session_show_the_same_pose_at_the_same_time(serv
     np.testing.assert_allclose(poses[0][1], poses[1][1], atol=0.02)
 
 
+async def test_viewers_pull_an_open_limb_together(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        motion = await client.upload(clip_file)
+        session = await client.open_session(motion["id"])
+        edited = await client.edit_session(session["id"], crowd={"right_hand": "median"})
+        assert edited["crowd"] == [{"limb": 1, "policy": "median", "pulls": 0}]
+        viewers = [Viewer(client.socket_url(f"/v1/sessions/{session['id']}/stream")) for _ in range(3)]
+        watching = [asyncio.create_task(viewer.watch(HANG_TIMEOUT_S)) for viewer in viewers]
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while 1 not in viewers[0].crowd_pulls or len(viewers[0].crowd_pulls[1].places) < 3:
+                for n, viewer in enumerate(viewers):
+                    await viewer.pull("right_hand", -0.2 * n, 0.4, 0.5)
+                await asyncio.sleep(0.05)
+            # not open
+            await viewers[0].pull("left_leg", 0.5)
+            while viewers[1].presence is None or viewers[1].presence.limbs != [None, "crowd", None, None]:
+                await viewers[0].pull("right_hand", 0.0, 0.4, 0.5)
+                await asyncio.sleep(0.05)
+        assert (await client.edit_session(session["id"], crowd={"right_hand": None}))["crowd"] == []
+        for task in watching:
+            task.cancel()
+        await asyncio.gather(*watching, return_exceptions=True)
+
+
 async def test_a_stream_that_is_refused_says_why(server: str) -> None:
     async with Client(server) as client:
         with pytest.raises(StreamEnded, match="No such motion"):

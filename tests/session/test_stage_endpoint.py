@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from pathlib import Path
 
 import msgpack
@@ -46,7 +46,13 @@ class FakeStageOwner:
     async def load_cast(self, cast: Cast) -> StoredMotion:
         raise ProblemError(404, "No such motion", cast.motion)
 
-    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:  # noqa: ARG002
+    async def save_record(
+        self,
+        stage: Stage,
+        state: TimelineState,
+        cast: Cast,  # noqa: ARG002
+        crowd: Mapping[int, str] | None = None,  # noqa: ARG002
+    ) -> None:
         self.saved.append(state.pack())
         self.shown.append(stage.timeline.pack())
         if self.fails:

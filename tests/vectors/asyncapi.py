@@ -44,7 +44,7 @@ CHANNELS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "One viewer of a session.",
         (
             *("ChannelHeader", "Description", "TimelineState", "Presence", "Data", "Overlay", "Live", "Choice"),
-            *("Pong", "Problem", "Ping", "Report"),
+            *("CrowdPulls", "Pong", "Problem", "Ping", "Report", "Pull"),
         ),
     ),
     "sessionControl": (

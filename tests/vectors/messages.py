@@ -23,6 +23,7 @@ from bunraku.wire.messages import (
     ChannelHeader,
     Choice,
     Claim,
+    CrowdPulls,
     Data,
     Description,
     Edit,
@@ -34,6 +35,7 @@ from bunraku.wire.messages import (
     Pong,
     Presence,
     Problem,
+    Pull,
     Refusal,
     Release,
     Report,
@@ -161,6 +163,10 @@ def make_vectors() -> dict[str, Any]:
         Bond([0, 5], True),
         Bond([1, 0], False),
         BondEnd([0, 5], "apart"),
+        Presence(1, [], ["crowd", *[None] * 3], crowd=[{"limb": 0, "policy": "trimmed mean", "pulls": 9_000}]),
+        Pull(1, [0.5, -0.25, 0.125]),
+        CrowdPulls(1, 9_000, [[0.5, -0.25, 0.125], [-0.75, 0.25, 0.375]]),
+        CrowdPulls(6, 0, []),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     live = Live(NOW_US, 2, {0: LiveBlock(8_000, b"ab"), 1: LiveBlock(4_000, b"c")}).pack()
@@ -201,6 +207,9 @@ def make_vectors() -> dict[str, Any]:
         "a bond of one limb": bytes([73]) + msgpack.packb({"limbs": [0], "wanted": True}),
         "a bond of three limbs": bytes([73]) + msgpack.packb({"limbs": [0, 1, 4], "wanted": True}),
         "a bond with a limb past the last": bytes([73]) + msgpack.packb({"limbs": [0, 16], "wanted": True}),
+        "a pull of two numbers": bytes([74]) + msgpack.packb({"limb": 0, "place": [0.5, 0.5]}),
+        "a pull that is not a number": bytes([74]) + msgpack.packb({"limb": 0, "place": [0.5, float("nan"), 0.5]}),
+        "a pull of a limb past the last": bytes([74]) + msgpack.packb({"limb": 16, "place": [0.5, 0.5, 0.5]}),
         "binary in place of text": bytes([8]) + msgpack.packb({"title": b"a", "detail": "b"}),
         "fewer lists of asks than limbs": bytes([6])
         + msgpack.packb({"viewers": 0, "puppeteers": [], "limbs": [None] * 4, "asks": [[]] * 3}),

@@ -37,15 +37,18 @@ from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.overlay_buffer import OverlayBuffer
 from bunraku.playout.track_set import TrackSet
+from bunraku.wire.limbs import limb_number
 from bunraku.wire.live import Live
 from bunraku.wire.messages import (
     ChannelHeader,
     Choice,
+    CrowdPulls,
     Data,
     Description,
     Pong,
     Presence,
     Problem,
+    Pull,
     Report,
     TimelineState,
     unpack,
@@ -85,6 +88,8 @@ class Viewer:
         self.clock = ReferenceClock()
         self.timeline_history = timeline.TimelineHistory()
         self.presence: Presence | None = None
+        self.crowd_pulls: dict[int, CrowdPulls] = {}
+        """Newest number and sample of the crowd's pulls of each limb, by number; limbs that nobody pulls have none."""
         self.motion: str | None = None
         self._tracks: TrackSet | None = None
         self._overlays = OverlayBuffer()
@@ -122,9 +127,19 @@ class Viewer:
             task.result()
         return self._finish_statistics()
 
+    async def pull(self, limb: str | int, x: float, y: float = 0.0, z: float = 0.0) -> None:
+        """Pull a limb of a session that is open to the crowd (`presence.crowd`), by name or number.
+
+        The target is that of `Puppeteer.target`: hands have the place of the tip in the shoulder's frame, arm lengths;
+        legs the thigh angle `x` in radians. It counts for 400 ms: send it again, at most 20 times per second, while it
+        lasts. It has no effect on other limbs and without a connection. Raises ValueError for an unknown name.
+        """
+        await self._connection.send(Pull(limb_number(limb), [float(x), float(y), float(z)]).pack())
+
     def _on_open(self) -> None:
         """Reset what belongs to one connection."""
         self.clock.restart()
+        self.crowd_pulls.clear()
         self.timeline_history.restart()
         self._reporter.restart()
 
@@ -323,6 +338,10 @@ class Viewer:
             self._on_description(message)
         elif isinstance(message, Presence):
             self.presence = message
+        elif isinstance(message, CrowdPulls):
+            self.crowd_pulls.pop(message.limb, None)
+            if message.count:
+                self.crowd_pulls[message.limb] = message
         elif isinstance(message, Choice):
             self.statistics.reason = message.reason
         elif isinstance(message, Problem):

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
 
 from bunraku.http.problem_details import invalid_field_problem
+from bunraku.marionette.crowd.policy import CrowdPolicy
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.placement import Placement
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, TIP_JOINTS, Figure
 from bunraku.runtime.problem import ProblemError
+from bunraku.wire.limbs import LIMBS, MAX_LIMBS
 
 MAX_BONE_M = 3.0
 """Longest part of an offset or tip along one axis."""
+
+
+LimbKey = Annotated[str, Field(pattern=rf"^({'|'.join(LIMBS)}|\d|1[0-5])$")]
+"""Name of a limb of the first performer, or number of a limb in decimal."""
 
 
 class NewSession(BaseModel):
@@ -30,13 +36,27 @@ class NewSession(BaseModel):
 
 
 class SessionEdit(BaseModel):
-    """Edits of a session's timeline; omitted fields stay unchanged."""
+    """Edits of a session's timeline and of its open limbs; omitted fields stay unchanged."""
 
     model_config = ConfigDict(extra="forbid")
     playing: bool | None = None
     position: Annotated[int | None, Field(ge=0, lt=1 << 53, description="microseconds")] = None
     loop: bool | None = None
     motion: Annotated[str | None, Field(max_length=64)] = None
+    crowd: Annotated[
+        dict[LimbKey, CrowdPolicy | None],
+        Field(
+            max_length=MAX_LIMBS,
+            description="merge policy of each limb to open to the crowd, by name of the limb or by number; "
+            "null closes it",
+        ),
+    ] = {}
+
+    def open_limbs(self, before: Mapping[int, str]) -> dict[int, str]:
+        """Return the policies of the open limbs after this edit, by number."""
+        edits = {LIMBS.index(key) if key in LIMBS else int(key): policy for key, policy in self.crowd.items()}
+        changed = {**before, **{limb: policy and policy.value for limb, policy in edits.items()}}
+        return {limb: policy for limb, policy in changed.items() if policy is not None}
 
 
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]

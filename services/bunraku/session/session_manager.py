@@ -11,6 +11,7 @@ import asyncio
 import contextlib
 import logging
 import secrets
+from collections.abc import Mapping
 from typing import Any
 
 from bunraku.codec.container import StoredMotion
@@ -155,8 +156,10 @@ class SessionManager:
             raise ProblemError(404, "No such motion", f"there is no motion {cast.base[:40]!r}", field="motion")
         return stored
 
-    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:
-        """Save a stage with its next timeline and cast.
+    async def save_record(
+        self, stage: Stage, state: TimelineState, cast: Cast, crowd: Mapping[int, str] | None = None
+    ) -> None:
+        """Save a stage with its next timeline, cast and open limbs (None: the present ones).
 
         Raises `ProblemError` if the session has ended or another replica owns it now.
         """
@@ -166,7 +169,15 @@ class SessionManager:
                 # closed meanwhile; the session was taken over again, with another stage
                 raise _lost_problem(SessionLost(stage.id, has_ended=False))
             try:
-                record = SessionRecord(self._registry.replicas.id, stage.created, state.pack(), stage.subject, cast)
+                crowd = stage.crowd.policies if crowd is None else crowd
+                record = SessionRecord(
+                    self._registry.replicas.id,
+                    stage.created,
+                    state.pack(),
+                    stage.subject,
+                    cast,
+                    tuple(crowd.items()),
+                )
                 endpoint.revision = await self._registry.save(stage.id, record, endpoint.revision)
             except SessionLost as lost:
                 await self._close_stage(stage.id)
@@ -374,7 +385,7 @@ class SessionManager:
         if confirmed is None:
             return
         record = claimed.record
-        start = SessionStart(session, stored, state, record.created_us, record.subject, record.cast)
+        start = SessionStart(session, stored, state, record.created_us, record.subject, record.cast, record.crowd)
         (await self._add_stage(start, confirmed.revision)).announce()
         self.counters.sessions["taken over",] += 1
         _log.warning("session %s taken over from another server", session)
@@ -413,7 +424,8 @@ def create_session_id() -> str:
 
 def _record_of(stage: Stage) -> SessionRecord:
     """Return the record of a session without an owner."""
-    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject, stage.cast)
+    crowd = tuple(stage.crowd.policies.items())
+    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject, stage.cast, crowd)
 
 
 def _lost_problem(lost: SessionLost) -> ProblemError:

@@ -42,17 +42,21 @@ class SessionRecord(NamedTuple):
     """Subject of the token that opened the session; empty without one, and in records of earlier releases."""
     cast: Cast = EMPTY_CAST
     """Live performers; none in records of earlier releases."""
+    crowd: tuple[tuple[int, str], ...] = ()
+    """Limbs that are open to the crowd, and their policies; none in records of earlier releases."""
 
     def pack(self) -> bytes:
         """Return the fields as MessagePack.
 
-        Without live performers and without a subject, replicas of earlier releases can read them.
+        Without live performers, open limbs and a subject, replicas of earlier releases can read them.
         """
         fields: list[Any] = [self.owner, self.created_us, self.timeline]
-        if self.subject or self.cast.members:
+        if self.subject or self.cast.members or self.crowd:
             fields.append(self.subject)
-        if self.cast.members:
+        if self.cast.members or self.crowd:
             fields.append(self.cast.to_values())
+        if self.crowd:
+            fields.append(self.crowd)
         packed: bytes = msgpack.packb(fields)
         return packed
 
@@ -62,7 +66,9 @@ class SessionRecord(NamedTuple):
         values = msgpack.unpackb(data)
         if not isinstance(values, list) or len(values) < 3:
             raise ValueError("not a record of a session")
+        crowd = values[5] if len(values) > 5 and isinstance(values[5], list) else []
         record = cls(*values[:4], *map(Cast.from_values, values[4:5]))
+        record = record._replace(crowd=tuple((limb, policy) for limb, policy in crowd))
         record.parse_timeline()
         return record
 

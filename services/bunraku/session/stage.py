@@ -1,9 +1,9 @@
 """One session: timeline, puppeteers, and the overlay of their limbs (paper 5).
 
-The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), and `appear`
-when it takes over a session of another replica or is connected to the bus again. It subscribes to `viewers` and
-responds to `state`. Overlays are computed for the time when they are due, `OVERLAY_LEAD_US` ahead of now, so that every
-viewer can show them on time.
+The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), `pulls` (17),
+and `appear` when it takes over a session of another replica or is connected to the bus again. It subscribes to
+`viewers` and `crowd` and responds to `state`. Overlays are computed for the time when they are due, `OVERLAY_LEAD_US`
+ahead of now, so that every viewer can show them on time.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from bunraku.playout.performance import SampleOutcome
 from bunraku.playout.session_log import SessionLog
 from bunraku.session.bond_control import BondControl
 from bunraku.session.counters import SessionCounters
+from bunraku.session.crowd_control import CrowdControl
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.session.live.live_performers import LivePerformers
@@ -80,6 +81,8 @@ class SessionStart:
     """Subject of the token that opened the session."""
     cast: Cast = EMPTY_CAST
     """Live performers."""
+    crowd: tuple[tuple[int, str], ...] = ()
+    """Limbs that are open to the crowd, and their policies."""
 
 
 class Stage:
@@ -120,11 +123,14 @@ class Stage:
         self._marionettes = Marionettes(_performer_figures(start.motion), solver=solver)
         self._ownership = self._marionettes.ownership
         self._bonds = BondControl(self._ownership, self.puppeteers)
+        self.crowd = CrowdControl(self._ownership, lambda pulls: bus.publish(f"session.{start.id}.pulls", pulls))
+        self.crowd.set_policies(dict(start.crowd), clock())
         self._set_motion(start.motion)
         subject = f"session.{start.id}"
         self._subscriptions: list[Subscription] = [
             bus.serve(f"{subject}.state", self._answer_state),
             bus.subscribe(f"{subject}.viewers", self._receive_viewer_count),
+            bus.subscribe(f"{subject}.crowd", self._receive_crowd),
         ]
         self._tick_task = asyncio.create_task(self._run_ticks(), name=f"stage {start.id}")
 
@@ -187,7 +193,9 @@ class Stage:
         asks = [list(limb) for limb in self._ownership.asks()]
         live = self.live.presence() or None
         bonds = [list(pair) for pair in self._ownership.bonds] or None
-        return Presence(self.presence_publisher.viewer_count, puppeteers, list(self.holders), asks, live, bonds)
+        crowd = self.crowd.presence() or None
+        viewers = self.presence_publisher.viewer_count
+        return Presence(viewers, puppeteers, list(self.holders), asks, live, bonds, crowd)
 
     def plan_edit(self, edit: SessionEdit, motion: StoredMotion | None) -> TimelineState | None:
         """Return the timeline after an edit, due `EDIT_LEAD_US` from now; None if the edit changes nothing.
@@ -348,6 +356,17 @@ class Stage:
     def _receive_viewer_count(self, message: bytes) -> None:
         self.presence_publisher.report_viewers(*msgpack.unpackb(message)[:2])
 
+    def open_limbs(self, policies: Mapping[int, str]) -> None:
+        """Open these limbs to the crowd, by number with their merge policies, and close all others."""
+        if self.crowd.set_policies(policies, self._clock()):
+            self.presence_publisher.publish()
+
+    def _receive_crowd(self, message: bytes) -> None:
+        now = self._clock()
+        if self.crowd.receive(message, now) and self.crowd.apply(now):
+            self._has_work.set()
+            self.presence_publisher.publish()
+
     async def _run_ticks(self) -> None:
         while True:
             await self._has_work.wait()
@@ -400,7 +419,8 @@ class Stage:
         for limb, holder in lost:
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
-        has_changes = self._bonds.report_ended()
+        has_changes = self.crowd.apply(now)
+        has_changes |= self._bonds.report_ended()
         if self._grant_free_limbs(now) or lost or has_changes:
             self.presence_publisher.publish()
         frame_overlays: list[OverlayJoints] = []

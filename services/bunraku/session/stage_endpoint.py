@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, Protocol
 
 import msgpack
@@ -61,8 +61,10 @@ class StageOwner(Protocol):
     async def load_cast(self, cast: Cast) -> StoredMotion:
         """Return the motion of a cast; raises `ProblemError`."""
 
-    async def save_record(self, stage: Stage, state: TimelineState, cast: Cast) -> None:
-        """Save a stage with its next timeline and cast, so that another replica can continue it."""
+    async def save_record(
+        self, stage: Stage, state: TimelineState, cast: Cast, crowd: Mapping[int, str] | None = None
+    ) -> None:
+        """Save a stage with its next timeline, cast and open limbs, so that another replica can continue it."""
 
     async def end_session(self, session: str) -> None:
         """End a session."""
@@ -170,8 +172,10 @@ class StageEndpoint:
             motion = await self._owner.load_cast(cast)
             await asyncio.to_thread(load_bend_tables, motion)
         state = stage.plan_edit(edit, motion)
+        crowd = edit.open_limbs(stage.crowd.policies)
         # saved before it is shown: a server that takes over continues what viewers have seen
-        await self._owner.save_record(stage, state or stage.timeline, cast)
+        await self._owner.save_record(stage, state or stage.timeline, cast, crowd)
+        stage.open_limbs(crowd)
         if state is not None:
             if motion is not None and stage.cast.members:
                 self._performers.replace(stage.cast)
@@ -256,4 +260,5 @@ def session_json(stage: Stage, now: int) -> dict[str, Any]:
         "viewers": presence.viewers,
         "puppeteers": presence.puppeteers,
         "limbs": presence.limbs,
+        "crowd": presence.crowd or [],
     }

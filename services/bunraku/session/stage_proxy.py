@@ -43,7 +43,7 @@ class StageProxy:
 
     async def edit(self, edit: SessionEdit) -> dict[str, Any]:
         """Edit the session and return it, once the edit is saved for a take-over by another replica."""
-        answer: dict[str, Any] = await self._request("edit", edit.model_dump(exclude_none=True))
+        answer: dict[str, Any] = await self._request("edit", edit.model_dump(mode="json", exclude_unset=True))
         return answer
 
     async def store_log(self, seconds: float | None) -> dict[str, Any]:

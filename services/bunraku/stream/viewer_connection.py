@@ -34,7 +34,7 @@ from bunraku.websocket.heartbeat import Heartbeat
 from bunraku.websocket.subprotocol import INTERNAL_ERROR, POLICY_VIOLATION, TRY_AGAIN_LATER, CloseConnection
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.live import Live
-from bunraku.wire.messages import Data, Edit, Ping, Report, TimelineState, unpack
+from bunraku.wire.messages import Data, Edit, Ping, Pull, Report, TimelineState, unpack
 from bunraku.wire.overlay import drop_earlier_frames
 
 WRITE_BATCH_BYTES = 16_384
@@ -51,6 +51,9 @@ class ViewerGroup(Protocol):
 
     def invalidate_writable(self) -> None:
         """Recompute, before the next overlay, which viewers can be written to directly."""
+
+    def pull(self, viewer: ViewerConnection, message: Pull) -> None:
+        """Record a viewer's pull on a limb that is open to the crowd."""
 
     def remove_viewer(self, viewer: ViewerConnection) -> None:
         """Remove a viewer whose connection has ended."""
@@ -158,6 +161,8 @@ class ViewerConnection(BinaryListener):
             now = self._context.clock()
             if delivery.process_report(received, now) or now >= self._next_flow_check_at:
                 self._context.scheduler.schedule(self, 0)
+        elif isinstance(received, Pull) and self.group is not None:
+            self.group.pull(self, received)
         elif isinstance(received, Edit) and self._has_own_timeline:
             self._edits.add(received)
             self._apply_edit(self._context.clock())

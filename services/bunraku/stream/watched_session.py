@@ -19,13 +19,14 @@ from bunraku.runtime import request_id
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.storage.motion_store import MotionStore
 from bunraku.stream.context import StreamContext
+from bunraku.stream.crowd_relay import CrowdRelay
 from bunraku.stream.sync_group import SyncGroups
 from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.websocket.frame import encode_frame
 from bunraku.websocket.multicast import MulticastGroup
 from bunraku.websocket.subprotocol import INTERNAL_ERROR, NOT_FOUND, SERVICE_RESTART, CloseConnection
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.messages import Presence, TimelineState, unpack
+from bunraku.wire.messages import Presence, Pull, TimelineState, unpack
 from bunraku.wire.overlay import Overlay
 
 VIEWER_COUNT_INTERVAL_S = 0.5
@@ -94,6 +95,8 @@ class WatchedSession:
         timeline, presence, overlay = _unpack_state(state)
         self._overlay: bytes | None = None if overlay is None else encode_frame(overlay)
         self._presence = encode_frame(presence)
+        self._crowd = CrowdRelay(source.replica, context.clock, self._publish_crowd)
+        self._crowd.set_presence(_parse_presence(presence))
         self._timeline = _parse_timeline(timeline)
         self._on_timeline(timeline)
         self._subscriptions: list[Subscription] = [
@@ -101,6 +104,7 @@ class WatchedSession:
             source.bus.subscribe(f"{self._subject}.presence", self._on_presence),
             source.bus.subscribe(f"{self._subject}.overlay", self._on_overlay),
             source.bus.subscribe(f"{self._subject}.live", self._send_newest),
+            source.bus.subscribe(f"{self._subject}.pulls", self._on_pulls),
             source.bus.subscribe(f"{self._subject}.appear", self._on_session_takeover),
         ]
 
@@ -146,6 +150,7 @@ class WatchedSession:
     def remove_viewer(self, viewer: ViewerConnection) -> None:
         """Remove a viewer whose connection has ended."""
         self._viewers.pop(viewer, None)
+        self._crowd.leave(viewer)
         self._writable = None
         self._publish_count_throttled(len(self._viewers))
         if not self._viewers:
@@ -179,6 +184,7 @@ class WatchedSession:
             self._motion_task = None
         if self._count_timer is not None:
             self._count_timer.cancel()
+        self._crowd.close()
         self._publish_count(0)
         if self._refresh_timer is not None:
             self._refresh_timer.cancel()
@@ -249,8 +255,7 @@ class WatchedSession:
             viewer.disconnect(reason)
 
     def _on_presence(self, message: bytes) -> None:
-        if not isinstance(unpack(message), Presence):
-            raise MalformedMessage("the subject presence of a session carries Presence messages only")
+        self._crowd.set_presence(_parse_presence(message))
         self._presence = encode_frame(message)
         for viewer in self._viewers:
             viewer.send_control(self._presence)
@@ -268,18 +273,33 @@ class WatchedSession:
     def _send_newest(self, message: bytes) -> None:
         """Send an Overlay or Live message to all viewers."""
         framed = encode_frame(message)
-        writable = self._writable
-        if writable is None:
-            writable = self._writable = MulticastGroup(
-                [viewer.connection for viewer in self._viewers if viewer.accepts_direct_writes], self._context.sender
-            )
-            self._unwritable = [viewer for viewer in self._viewers if not viewer.accepts_direct_writes]
+        writable = self._writable_group()
         for viewer in self._unwritable:
             viewer.send_newest(framed)
         # before the addition reads the counter, as writes to single connections increment it too
         sent_bytes = writable.write(framed)
         self._context.counters.bytes += sent_bytes
         self._context.counters.overlays += len(writable)
+
+    def _writable_group(self) -> MulticastGroup:
+        if self._writable is None:
+            self._writable = MulticastGroup(
+                [viewer.connection for viewer in self._viewers if viewer.accepts_direct_writes], self._context.sender
+            )
+            self._unwritable = [viewer for viewer in self._viewers if not viewer.accepts_direct_writes]
+        return self._writable
+
+    def pull(self, viewer: ViewerConnection, message: Pull) -> None:
+        """Record a viewer's pull on a limb that is open to the crowd."""
+        self._crowd.pull(viewer, message)
+
+    def _publish_crowd(self, summary: bytes) -> None:
+        self._source.bus.publish(f"{self._subject}.crowd", summary)
+
+    def _on_pulls(self, message: bytes) -> None:
+        """Send the crowd's pulls to the viewers on unconstrained links; others do without."""
+        sent_bytes = self._writable_group().write(encode_frame(message))
+        self._context.counters.bytes += sent_bytes
 
 
 class WatchedSessions:
@@ -386,6 +406,13 @@ def _unpack_state(state: bytes) -> tuple[bytes, bytes, bytes | None]:
     """Return timeline, presence and overlay; owners of later releases may send more."""
     timeline, presence, overlay = msgpack.unpackb(state)[:3]
     return timeline, presence, overlay
+
+
+def _parse_presence(message: bytes) -> Presence:
+    presence = unpack(message)
+    if not isinstance(presence, Presence):
+        raise MalformedMessage("the subject presence of a session carries Presence messages only")
+    return presence
 
 
 def _parse_timeline(message: bytes) -> TimelineState:

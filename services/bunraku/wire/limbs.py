@@ -7,6 +7,9 @@ MAX_LIMBS = len(LIMBS) * MAX_PERFORMERS
 MAX_BONDS = MAX_LIMBS // 4
 """Most bonds of a stage: half of a performer's limbs are hands, and each is in one bond."""
 
+MAX_SHOWN_PULLS = 16
+"""Most pulls of a crowd on one limb that viewers are sent."""
+
 
 def limb_number(limb: str | int) -> int:
     """Return the number of a limb of the first performer by its name; a number is returned unchanged.

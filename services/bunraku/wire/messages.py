@@ -17,7 +17,7 @@ import msgpack
 from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
 
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import MAX_BONDS, MAX_LIMBS, MAX_PERFORMERS
+from bunraku.wire.limbs import MAX_BONDS, MAX_LIMBS, MAX_PERFORMERS, MAX_SHOWN_PULLS
 from bunraku.wire.live import Live, Sample
 from bunraku.wire.overlay import Overlay
 
@@ -97,6 +97,32 @@ LiveEntries = Annotated[
 ]
 
 
+CrowdEntries = Annotated[
+    list[dict[str, Any]],
+    WithJsonSchema(
+        {
+            "type": "array",
+            "items": {
+                "title": "CrowdPresence",
+                "type": "object",
+                "properties": {
+                    "limb": {"type": "integer", "minimum": 0, "maximum": MAX_LIMBS - 1},
+                    "policy": {"type": "string"},
+                    "pulls": {"type": "integer", "minimum": 0},
+                },
+                "required": ["limb", "policy", "pulls"],
+            },
+            "minItems": 1,
+        }
+    ),
+]
+FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Place = Annotated[
+    list[FiniteNumber],
+    Field(min_length=3, max_length=3, description="Target of a limb, as the values of an Input of kind 1."),
+]
+
+
 class _MapMessage:
     """Base of messages that are a type byte and a MessagePack map of the fields that are not None."""
 
@@ -153,7 +179,7 @@ class Presence(_MapMessage):
 
     `limbs` has an id or None for each limb. `asks` has a list of ids for each limb, in the order of the requests; if it
     is empty it is replaced by an empty list for each limb. `live` is None if no performer is live, `bonds` if no hands
-    are bonded.
+    are bonded, `crowd` if no limb is open to the crowd.
     """
 
     TYPE = 6
@@ -169,6 +195,9 @@ class Presence(_MapMessage):
     bonds: Annotated[
         list[HandPair] | None,
         Field(min_length=1, max_length=MAX_BONDS, description="Bonded hands; absent: none."),
+    ] = None
+    crowd: Annotated[
+        CrowdEntries | None, Field(description="Limbs that are open to the crowd, by number; absent: none.")
     ] = None
 
     def __post_init__(self) -> None:
@@ -233,6 +262,16 @@ class BondEnd(_MapMessage):
     TYPE = 16
     limbs: HandPair
     reason: Annotated[Text, Field(description="A reason of proto/messages.md, 3.7.")]
+
+
+@dataclass(frozen=True, slots=True)
+class CrowdPulls(_MapMessage):
+    """Some of the crowd's pulls of a limb."""
+
+    TYPE = 17
+    limb: LimbNumber
+    count: Annotated[SafeInteger, Field(description="Number of members who pull.")]
+    places: Annotated[list[Place], Field(max_length=MAX_SHOWN_PULLS, description="Targets of some of them.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,6 +348,15 @@ class Bond(_MapMessage):
     TYPE = 73
     limbs: HandPair
     wanted: Flag
+
+
+@dataclass(frozen=True, slots=True)
+class Pull(_MapMessage):
+    """Pull of a viewer on a limb that is open to the crowd."""
+
+    TYPE = 74
+    limb: LimbNumber
+    place: Place
 
 
 @dataclass(frozen=True, slots=True)
@@ -416,14 +464,15 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Notice | BondEnd | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Bond | Input | Sample
+    | Notice | BondEnd | CrowdPulls | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Bond | Pull
+    | Input | Sample
 )  # fmt: skip
 
 FIXED_MESSAGES = (Data, Overlay, Live, Ping, Pong, Input, Sample)
 """Messages of fixed layout."""
 MAP_MESSAGES = (
-    ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, BondEnd, Choice,
-    Edit, Report, Claim, Release, Alive, Ask, Bond,
+    ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, BondEnd,
+    CrowdPulls, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull,
 )  # fmt: skip
 """Messages that are a MessagePack map."""
 

@@ -1,6 +1,7 @@
 /** HTTP API for motions and sessions (`proto/http.md`). */
 
 import { pageTranslator } from "../i18n/translator";
+import type { CrowdPresence } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
 import { ProblemError } from "./problem";
 
@@ -40,14 +41,18 @@ export interface Session {
   viewers: number;
   puppeteers: { id: string; name: string; colour: number }[];
   limbs: (string | null)[];
+  /** Limbs that are open to the crowd. */
+  crowd?: CrowdPresence[];
 }
 
-/** Edit of a session's timeline; `position` in microseconds. */
+/** Edit of a session's timeline and of its open limbs; `position` in microseconds. */
 export interface SessionEdit {
   playing?: boolean;
   position?: number;
   loop?: boolean;
   motion?: string;
+  /** Policy of each limb to open to the crowd, by name or number of the limb; null closes it. */
+  crowd?: Readonly<Record<string, "median" | "trimmed mean" | "turns" | "vote" | null>>;
 }
 
 /**

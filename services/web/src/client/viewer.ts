@@ -15,7 +15,7 @@ import { type LeaderTime, PresentationClock } from "../playout/presentation-cloc
 import { positionAt, TimelineHistory } from "../playout/timeline";
 import { TrackSet } from "../playout/track-set";
 import type { Live } from "../wire/live";
-import type { Data, Description, Edit, Message, Presence, TimelineState } from "../wire/messages";
+import type { CrowdPulls, Data, Description, Edit, Message, Presence, TimelineState } from "../wire/messages";
 import { OVERLAY_FRAME_INTERVAL_US, type Overlay } from "../wire/overlay";
 import { pageAccess } from "./access";
 import type { LimbPredictor } from "./performer-view";
@@ -39,6 +39,7 @@ const NO_BLOCKS = new Int8Array(0);
  * - "open": connected; "replaced" follows if a silent connection was replaced.
  * - "figure": a motion was described; "tracks": more of its tracks were.
  * - "timeline", "presence": there is a new one.
+ * - "pulls": `crowdPulls` changed.
  * - "blocks": `blocks` of the first performer changed.
  * - "closed" (a CustomEvent, detail: the reason): the connection is lost, or closed for good if `isClosed`.
  */
@@ -48,6 +49,8 @@ export class Viewer extends EventTarget {
   /** True if the connection is closed for good. */
   isClosed = false;
   presence: Presence | null = null;
+  /** Number and some places of the crowd's pulls, by number of the limb; limbs that nobody pulls have none. */
+  readonly crowdPulls = new Map<number, CrowdPulls>();
   motion: string | null = null;
   readonly timelineHistory = new TimelineHistory();
   /** Source of the stage time that the audio presents at local `nowMs`; the stage follows it while it is not null. */
@@ -234,6 +237,15 @@ export class Viewer extends EventTarget {
     return this.connection.send({ name: "Edit", playing, position: positionUs, loop } satisfies Edit);
   }
 
+  /**
+   * Pull a limb of a session that is open to the crowd (`presence.crowd`): a hand to a place in the shoulder's frame, in
+   * arm lengths, a leg to the angle `x` in radians. It counts for 400 ms: send it again, at most 20 times per second.
+   * Return false if not connected.
+   */
+  pull(limb: number, x: number, y = 0, z = 0): boolean {
+    return this.connection.send({ name: "Pull", limb, place: [x, y, z] });
+  }
+
   /** Return the current statistics. */
   statistics(): ViewerStatistics {
     return this.collector.summarise(this.now(), this.bufferedUs());
@@ -312,6 +324,11 @@ export class Viewer extends EventTarget {
       case "Presence":
         this.presence = message;
         this.dispatch("presence");
+        break;
+      case "CrowdPulls":
+        if (message.count > 0) this.crowdPulls.set(message.limb, message);
+        else this.crowdPulls.delete(message.limb);
+        this.dispatch("pulls");
         break;
       case "Choice":
         this.collector.choice = message;

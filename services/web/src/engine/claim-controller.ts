@@ -79,7 +79,10 @@ export class ClaimController {
     this.#playback = playback;
     this.#contestedLimb = null;
     const { viewer, puppeteer } = playback;
-    if (this.#stageInputs) this.#stageInputs.hands.puppeteer = puppeteer;
+    if (this.#stageInputs) {
+      this.#stageInputs.hands.crowdMember = viewer;
+      this.#stageInputs.hands.puppeteer = puppeteer;
+    }
     const on = <T>(name: string, listener: (detail: T) => void) =>
       puppeteer.addEventListener(name, (event) => listener((event as CustomEvent<T>).detail));
     const render = () => this.render();
@@ -127,7 +130,7 @@ export class ClaimController {
     const holders = limbHolders(...context);
     const requesters = limbRequesters(...context);
     return holders.map((sessionHolder, limb) => {
-      const mine = Boolean(hands?.source(limb));
+      const mine = Boolean(hands?.source(limb) && !hands.isCrowdPull(limb));
       const holder = mine
         ? { id: puppeteer?.id ?? "", name: this.translator.translate("You"), colour: puppeteer?.colour ?? 0, mine }
         : sessionHolder?.mine
@@ -145,6 +148,11 @@ export class ClaimController {
   isFree(limb: number): boolean {
     const state = this.limbStates()[limb];
     return !this.viewOnly && state !== undefined && !state.holder;
+  }
+
+  /** Return whether a pointer can pull a limb: it is free, or open to the crowd, for viewers too. */
+  canPull(limb: number): boolean {
+    return this.isFree(limb) || (this.connected && this.#stageInputs?.hands.isOpen(limb) === true);
   }
 
   render(): void {

@@ -15,7 +15,7 @@ import type { Graphics } from "../stage/rendering/graphics";
 import { Stage } from "../stage/stage";
 import type { StringState } from "../stage/strings/strings";
 import type { LimbState } from "../ui/limb-state";
-import { performerOfLimb } from "../wire/limbs";
+import { CROWD, performerOfLimb } from "../wire/limbs";
 import type { ClaimController } from "./claim-controller";
 import type { Playback } from "./playback";
 
@@ -100,7 +100,7 @@ export class StageController {
       selection,
     });
     this.pointer = createPointerInput(this.stage, this.hands, {
-      canClaim: isFree,
+      canClaim: (limb) => limbController.canPull(limb),
       onRefused: (limb) => limbController.onClaimRefused(limb),
       onClaimed: (limb) => selection.select(performerOfLimb(limb)),
       smoothing: () => getMapping().pointerSmoothing,
@@ -122,6 +122,7 @@ export class StageController {
   /** Show another playback. With null, the last performers stay on the stage and stand still. */
   setPlayback(playback: Playback | null): void {
     this.#playback = playback;
+    this.hands.crowdMember = playback?.viewer ?? null;
     this.hands.puppeteer = playback?.puppeteer ?? null;
     this.#body = null;
     this.updatePerformers();
@@ -180,7 +181,9 @@ export class StageController {
     const strings = limbs.map(({ holder, selected }, limb): StringState => {
       const isSelected = performerOfLimb(limb) === selection.performer;
       return {
-        puppeteer: holder?.colour ?? null,
+        puppeteer: holder && holder.id !== CROWD ? holder.colour : null,
+        isOpen: hands.isOpen(limb),
+        crowdThreads: hands.crowdThreads(limb, viewer?.crowdPulls.get(limb)?.places ?? []),
         isHighlighted:
           pointer.hoveredLimb === limb ||
           highlightedLimbs.includes(limb) ||

@@ -261,6 +261,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Right leg": "右足",
   You: "あなた",
   Someone: "ゲスト",
+  "The audience": "観客",
   "Take a string": "糸を持つ",
   Dancer: "踊り手",
   "Dancer {number}": "踊り手{number}",

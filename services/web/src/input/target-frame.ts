@@ -6,6 +6,11 @@ export function toShoulderFrame(tip: Vector3, shoulder: Vector3, chest: Quaterni
   return tip.clone().sub(shoulder).applyQuaternion(chest.clone().invert()).divideScalar(armLength);
 }
 
+/** Return the world position of a place in the shoulder's frame, the inverse of `toShoulderFrame`. */
+export function fromShoulderFrame(place: Vector3, shoulder: Vector3, chest: Quaternion, armLength: number): Vector3 {
+  return place.clone().multiplyScalar(armLength).applyQuaternion(chest).add(shoulder);
+}
+
 /** Return a world direction in the axes of the chest. */
 export function toChestFrame(direction: Vector3, chest: Quaternion): Vector3 {
   return direction.clone().applyQuaternion(chest.clone().invert());

@@ -2,7 +2,7 @@
 import type { Viewer } from "../client/viewer";
 import { type PlainMessageKey, pageTranslator } from "../i18n/translator";
 import { LIMBS } from "../motion/skeleton";
-import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
+import { CROWD, limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
 
 export type Presence = NonNullable<Viewer["presence"]>;
 export type Timeline = NonNullable<Viewer["timeline"]>;
@@ -103,7 +103,7 @@ export function limbHolders(
     return {
       id,
       mine,
-      name: mine ? translate("You") : person?.name || translate("Someone"),
+      name: mine ? translate("You") : person?.name || translate(id === CROWD ? "The audience" : "Someone"),
       colour: person?.colour ?? 0,
     };
   });

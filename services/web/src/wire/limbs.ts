@@ -25,3 +25,6 @@ export function limbWithinPerformer(number: number): number {
 export function isHand(number: number): boolean {
   return limbWithinPerformer(number) < 2;
 }
+
+/** Id under which the crowd holds a limb (proto/server.md, 6.3). */
+export const CROWD = "crowd";

@@ -4,6 +4,7 @@ import { decode, encode } from "@msgpack/msgpack";
 import { MalformedMessage } from "./errors";
 import { MAX_LIMBS, MAX_PERFORMERS } from "./limbs";
 import {
+  type CrowdPresence,
   type LivePresence,
   MESSAGE_TYPES,
   type Message,
@@ -30,9 +31,15 @@ const flag: FieldParser = (value) => (requireValid(typeof value === "boolean", "
 const count: FieldParser = (value) => (
   requireValid(Number.isSafeInteger(value) && (value as number) >= 0, "a whole number of 0..2^53"), value
 );
+const finite: FieldParser = (value) => (requireValid(Number.isFinite(value), "a finite number"), value);
 const limb: FieldParser = (value) => (
   count(value), requireValid((value as number) < MAX_LIMBS, `a limb, 0..${MAX_LIMBS - 1}`), value
 );
+const place: FieldParser = (value) => {
+  const parts = list(finite)(value) as unknown[];
+  requireValid(parts.length === 3, "three numbers");
+  return parts;
+};
 const limbPair: FieldParser = (value) => {
   const pair = list(limb)(value) as unknown[];
   requireValid(pair.length === 2, "two limbs");
@@ -77,6 +84,14 @@ const livePerformer = mapOf(
   }),
 );
 
+const openLimb = mapOf(
+  (value): CrowdPresence => ({
+    limb: limb(value.limb) as number,
+    policy: text(value.policy) as string,
+    pulls: count(value.pulls) as number,
+  }),
+);
+
 /** Requests for each of the `limbs` read before; absent, there are none. */
 const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>>): unknown => {
   const each = limbs as unknown[];
@@ -117,6 +132,7 @@ export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
     asks: asksPerLimb,
     live: optional(list(livePerformer)),
     bonds: optional(list(limbPair)),
+    crowd: optional(list(openLimb)),
   },
   Problem: { title: text, detail: text },
   Welcome: { id: text, colour: count, lead: count },
@@ -124,6 +140,7 @@ export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
   Refusal: { limb, reason: text, holder: optional(text) },
   Notice: { limb, reason: text, detail: text },
   BondEnd: { limbs: limbPair, reason: text },
+  CrowdPulls: { limb, count, places: list(place) },
   Choice: { rate: count, reason: text, line: optional(count) },
 };
 
@@ -136,6 +153,7 @@ export const CLIENT_MAP_FIELDS: MapFields<Exclude<MapMessageName, ServerMapName>
   Alive: { limbs: list(limb) },
   Ask: { limb, wanted: flag },
   Bond: { limbs: limbPair, wanted: flag },
+  Pull: { limb, place },
 };
 
 /** Encodes a message: the type byte and the map of its fields that are not null. */

@@ -84,6 +84,8 @@ export interface Presence {
   live: LivePresence[] | null;
   /** Bonded hands; absent: none. */
   bonds: number[][] | null;
+  /** Limbs that are open to the crowd, by number; absent: none. */
+  crowd: CrowdPresence[] | null;
 }
 
 /** Answer to a Ping: its `sequence` and `sent`, and the clock times of its arrival and of this answer. */
@@ -161,6 +163,17 @@ export interface BondEnd {
   limbs: number[];
   /** A reason of proto/messages.md, 3.7. */
   reason: string;
+}
+
+/** Some of the crowd's pulls of a limb. */
+export interface CrowdPulls {
+  name: "CrowdPulls";
+  /** Limb l of performer k has number 4 k + l. */
+  limb: number;
+  /** Number of members who pull. */
+  count: number;
+  /** Targets of some of them. */
+  places: number[][];
 }
 
 /** Clock request. It has the size of the answer, so that both directions take equally long to transmit. */
@@ -250,6 +263,15 @@ export interface Bond {
   wanted: boolean;
 }
 
+/** Pull of a viewer on a limb that is open to the crowd. */
+export interface Pull {
+  name: "Pull";
+  /** Limb l of performer k has number 4 k + l. */
+  limb: number;
+  /** Target of a limb, as the values of an Input of kind 1. */
+  place: number[];
+}
+
 export interface PuppeteerPresence {
   id: string;
   name: string;
@@ -260,6 +282,12 @@ export interface LivePresence {
   performer: number;
   id: string;
   name: string;
+}
+
+export interface CrowdPresence {
+  limb: number;
+  policy: string;
+  pulls: number;
 }
 
 export type ServerMessage =
@@ -277,9 +305,10 @@ export type ServerMessage =
   | Notice
   | Choice
   | Live
-  | BondEnd;
+  | BondEnd
+  | CrowdPulls;
 
-export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond;
+export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond | Pull;
 
 export type Message = ServerMessage | ClientMessage;
 
@@ -300,6 +329,7 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Choice: 13,
   Live: LIVE_TYPE,
   BondEnd: 16,
+  CrowdPulls: 17,
   Ping: 64,
   Edit: 65,
   Report: 66,
@@ -310,4 +340,5 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Ask: 71,
   Sample: 72,
   Bond: 73,
+  Pull: 74,
 };

@@ -142,6 +142,7 @@ describe("a bond of two hands", () => {
       name: "Presence",
       live: null,
       bonds,
+      crowd: null,
       viewers: 1,
       puppeteers: [],
       limbs: ["a1", null, null, null],
@@ -218,7 +219,7 @@ describe("a bond of two hands", () => {
 
 describe("request for a limb that another puppeteer holds", () => {
   const presence = (limbs: (string | null)[], asks: string[][]) =>
-    socket.receive({ name: "Presence", live: null, bonds: null, viewers: 2, puppeteers: [], limbs, asks });
+    socket.receive({ name: "Presence", live: null, bonds: null, crowd: null, viewers: 2, puppeteers: [], limbs, asks });
   const held = ["b2", null, null, null];
   let events: unknown[];
 
@@ -445,6 +446,7 @@ describe("own limb", () => {
       name: "Presence",
       live: null,
       bonds: null,
+      crowd: null,
       viewers: 2,
       puppeteers: [],
       limbs: ["b2", null, null, null],

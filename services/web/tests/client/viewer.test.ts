@@ -27,6 +27,23 @@ import {
 
 isolateViewers();
 
+describe("crowd", () => {
+  test("pull is sent, and the pulls of a limb are known until nobody pulls", () => {
+    createViewer();
+    expect(viewer.pull(1, 0.5)).toBe(false);
+    FakeWebSocket.last.accept();
+    expect(viewer.pull(1, 0.5, -0.25, 0.125)).toBe(true);
+    expect(FakeWebSocket.last.sent.filter(({ name }) => name === "Pull")).toEqual([{ name: "Pull", limb: 1, place: [0.5, -0.25, 0.125] }]);
+    let changes = 0;
+    viewer.addEventListener("pulls", () => changes++);
+    const pulls = { name: "CrowdPulls", limb: 1, count: 2, places: [[0.5, 0, 0]] } as const;
+    FakeWebSocket.last.receive({ ...pulls, places: [[0.5, 0, 0]] });
+    expect(viewer.crowdPulls.get(1)).toEqual(pulls);
+    FakeWebSocket.last.receive({ name: "CrowdPulls", limb: 1, count: 0, places: [] });
+    expect([viewer.crowdPulls.size, changes]).toEqual([0, 2]);
+  });
+});
+
 describe("start", () => {
   test("state is empty before the first message", () => {
     createViewer();
@@ -49,6 +66,7 @@ describe("start", () => {
       name: "Presence",
       live: null,
       bonds: null,
+      crowd: null,
       viewers: 1,
       puppeteers: [],
       limbs: [null, null, null, null],

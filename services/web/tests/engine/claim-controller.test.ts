@@ -84,8 +84,40 @@ test("limbs can be claimed once the stage and the connection are there", () => {
 /** Send a presence message on both connections. */
 function sendPresence(limbs: (string | null)[], asks: string[][] = [[], [], [], []]): void {
   for (const socket of [stream, control])
-    socket.receive({ name: "Presence", live: null, bonds: null, viewers: 2, puppeteers: PEOPLE, limbs, asks });
+    socket.receive({
+      name: "Presence",
+      live: null,
+      bonds: null,
+      crowd: null,
+      viewers: 2,
+      puppeteers: PEOPLE,
+      limbs,
+      asks,
+    });
 }
+
+test("limb that is open to the audience can be pulled by viewers too, and is not shown as held here", () => {
+  controller.viewOnly = true;
+  const presence = (crowd: { limb: number; policy: string; pulls: number }[] | null) =>
+    stream.receive({
+      name: "Presence",
+      live: null,
+      bonds: null,
+      crowd,
+      viewers: 2,
+      puppeteers: [],
+      limbs: ["crowd", null, null, null],
+      asks: [[], [], [], []],
+    });
+  presence(null);
+  expect([controller.canPull(LEFT_HAND), controller.canPull(RIGHT_HAND)]).toEqual([false, false]);
+  presence([{ limb: LEFT_HAND, policy: "median", pulls: 3 }]);
+  expect([controller.canPull(LEFT_HAND), controller.canPull(RIGHT_HAND)]).toEqual([true, false]);
+  hands.claim(LEFT_HAND, "pointer");
+  expect(controller.limbStates()[LEFT_HAND].holder?.name).toBe("The audience");
+  hands.release(LEFT_HAND);
+  expect(control.messagesOf("Claim")).toEqual([]);
+});
 
 describe("limb held by another user", () => {
   beforeEach(() => sendPresence(["m", null, null, null]));
@@ -257,6 +289,7 @@ describe("joined hands", () => {
       name: "Presence",
       live: null,
       bonds,
+      crowd: null,
       viewers: 1,
       puppeteers: PEOPLE,
       limbs,

@@ -33,6 +33,7 @@ export class FakePuppeteer {
 export function createLimbController(
   puppets: Puppet | readonly Puppet[] | null,
   puppeteer: FakePuppeteer | null,
+  now?: () => number,
 ): LimbController {
   const stage = {
     performers: puppets === null ? [] : "group" in puppets ? [puppets] : puppets,
@@ -40,7 +41,7 @@ export function createLimbController(
     up: () => new Vector3(0, 1, 0),
     back: () => new Vector3(0, 0, 1),
   };
-  const limbController = new LimbController(stage as unknown as Stage);
+  const limbController = new LimbController(stage as unknown as Stage, now);
   limbController.puppeteer = puppeteer as unknown as Puppeteer | null;
   return limbController;
 }

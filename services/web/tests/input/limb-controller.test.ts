@@ -1,6 +1,7 @@
 import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import type { Puppeteer } from "../../src/client/puppeteer";
+import type { CrowdMember } from "../../src/input/limb-controller";
 import { jointPosition, LEFT_FINGER_TIP } from "../../src/stage/puppet/standard-figure";
 import { createStandingPuppet } from "../stage/puppet/figures";
 import { createLimbController, FakePuppeteer } from "./fake-puppeteer";
@@ -133,6 +134,63 @@ describe("pull", () => {
     const [[asked, limb, ...angle]] = session.takeCalls();
     expect([asked, limb]).toEqual(["target", RIGHT_LEG]);
     expectClose(angle, [Math.PI / 2, 0, 0]);
+  });
+});
+
+describe("limb that is open to the crowd", () => {
+  const createMember = (holder: string | null) => {
+    const pulls: number[][] = [];
+    const presence = { limbs: [holder, null, null, null], crowd: [{ limb: LEFT_HAND, policy: "median", pulls: 0 }] };
+    const pull = (limb: number, ...place: number[]) => pulls.push([limb, ...place]) > 0;
+    return { pulls, member: { presence, pull } as unknown as CrowdMember };
+  };
+
+  test("a pointer pulls it with the crowd, at a limited rate, and claims nothing", () => {
+    let now = 0;
+    const session = new FakePuppeteer();
+    const limbController = createLimbController(createStandingPuppet(), session, () => now);
+    const { pulls, member } = createMember("crowd");
+    limbController.crowdMember = member;
+    expect([limbController.isOpen(LEFT_HAND), limbController.isOpen(RIGHT_LEG)]).toEqual([true, false]);
+    expect(limbController.claim(LEFT_HAND, "pointer")).toBe(true);
+    expect(limbController.isCrowdPull(LEFT_HAND)).toBe(true);
+    for (; now < 200; now += 10) limbController.pullTo(LEFT_HAND, new Vector3(0.5, 1.5, 0.2));
+    expect(pulls.length).toBe(4);
+    limbController.release(LEFT_HAND);
+    expect([limbController.source(LEFT_HAND), limbController.isCrowdPull(LEFT_HAND)]).toEqual([null, false]);
+    expect(session.calls).toEqual([]);
+  });
+
+  test("a viewer without a puppeteer pulls it, and keys claim it", () => {
+    const { member } = createMember(null);
+    const viewerOnly = createLimbController(createStandingPuppet(), null);
+    viewerOnly.crowdMember = member;
+    expect([viewerOnly.claim(LEFT_HAND, "velocity"), viewerOnly.claim(LEFT_HAND, "pointer")]).toEqual([false, true]);
+    const session = new FakePuppeteer();
+    const limbController = createLimbController(createStandingPuppet(), session);
+    limbController.crowdMember = member;
+    limbController.claim(LEFT_HAND, "pointer");
+    limbController.claim(LEFT_HAND, "velocity");
+    expect([session.takeCalls(), limbController.isCrowdPull(LEFT_HAND)]).toEqual([[["claim", LEFT_HAND]], false]);
+  });
+
+  test("while a puppeteer holds it, it is not open", () => {
+    const limbController = createLimbController(createStandingPuppet(), null);
+    limbController.crowdMember = createMember("m").member;
+    expect([limbController.isOpen(LEFT_HAND), limbController.claim(LEFT_HAND, "pointer")]).toEqual([false, false]);
+  });
+
+  test("threads go from the handle towards the places", () => {
+    const puppet = createStandingPuppet();
+    const limbController = createLimbController(puppet, null);
+    const handle = puppet.handle(LEFT_HAND, new Vector3());
+    const [up, left] = limbController.crowdThreads(LEFT_HAND, [
+      [0, 1, 0],
+      [1, 0, 0],
+    ]);
+    expect(up.y).toBeGreaterThan(handle.y + 0.3);
+    expect(left.x).toBeGreaterThan(handle.x + 0.3);
+    expect(limbController.crowdThreads(RIGHT_LEG, [[1, 0, 0]])).toEqual([]);
   });
 });
 

@@ -13,6 +13,7 @@ test("holders and requesters of limbs have names and colours", () => {
     name: "Presence" as const,
     live: null,
     bonds: null,
+    crowd: null,
     viewers: 2,
     puppeteers: [
       { id: "a", name: "Aiko", colour: 0 },

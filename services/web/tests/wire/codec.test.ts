@@ -73,6 +73,7 @@ test("asks has one list per limb, for any number of performers", () => {
     name: "Presence",
     live: null,
     bonds: null,
+    crowd: null,
     viewers: 1,
     puppeteers: [],
     limbs: Array.from({ length: limbs }, () => null),
@@ -105,6 +106,7 @@ test("live performer has a number of 0..3, an id and a name", () => {
       asks: [],
       live: [entry],
       bonds: null,
+      crowd: null,
     }) as unknown as Message;
   const valid = presence({ performer: 3, id: "p", name: "Aiko" });
   expect(unpack(pack(valid))).toEqual(valid);

@@ -18,6 +18,10 @@ export interface StringState {
   pullTarget: Vector3 | null;
   /** True if the performer is not the selected one: its strings are dimmed. */
   isDimmed?: boolean;
+  /** True if the audience can pull the limb. */
+  isOpen?: boolean;
+  /** Ends of the threads of the audience's pulls, in world metres. */
+  crowdThreads?: readonly Vector3[];
 }
 
 /** View of the strings. */
@@ -39,6 +43,9 @@ export interface StringsView {
 const FREE_STRING: StringState = { puppeteer: null, isHighlighted: false, pullTarget: null };
 /** Remaining opacity of dimmed rings and threads. */
 const DIMMED_SHARE = 0.42;
+/** Most threads of the audience's pulls, over all limbs. */
+const MAX_CROWD_THREADS = 64;
+const CROWD_THREAD = { alpha: 0.5, tension: 0, sag: 0.02, fadesOut: true };
 const HIDDEN_POSITION = new Vector3();
 
 /** Lengths of the threads of free limbs, for hands and legs, in metres for the standard figure. */
@@ -83,13 +90,14 @@ export class Strings {
   /** Disables easing and shaking. */
   reducedMotion = false;
   readonly #threads = new Threads();
+  readonly #crowdThreads = new Threads(MAX_CROWD_THREADS);
   readonly #rings = new HandleRings();
   readonly #bars = new ControlBars();
   readonly #animations: StringAnimation[];
 
   constructor() {
     this.group.name = "strings";
-    this.group.add(this.#threads.mesh, this.#rings.mesh, this.#bars.mesh);
+    this.group.add(this.#threads.mesh, this.#crowdThreads.mesh, this.#rings.mesh, this.#bars.mesh);
     this.group.visible = false;
     this.#animations = Array.from({ length: MAX_LIMBS }, () => ({
       held: 0,
@@ -103,7 +111,7 @@ export class Strings {
 
   /** Draws for a transparent picture, whose colours are multiplied by its alpha. */
   set isOverNothing(on: boolean) {
-    this.#threads.isOverNothing = on;
+    this.#threads.isOverNothing = this.#crowdThreads.isOverNothing = on;
   }
 
   /** Shows the rings by which limbs are taken. */
@@ -147,6 +155,19 @@ export class Strings {
       string ? this.#drawString(limb, string, look, seconds, view.right) : this.#hideString(limb),
     );
     this.#bars.set(bars.filter((bar) => bar !== null));
+    this.#drawCrowdThreads(visible, look);
+  }
+
+  /** Draw the pulls of the audience as fans of fine threads. */
+  #drawCrowdThreads(strings: readonly StringLayout[], look: Look): void {
+    const threads = strings
+      .flatMap(({ state, handle }) => (state.crowdThreads ?? []).map((end) => ({ handle, end })))
+      .slice(0, MAX_CROWD_THREADS);
+    this.#crowdThreads.dark = look.dark;
+    this.#crowdThreads.count = threads.length;
+    threads.forEach(({ handle, end }, index) => {
+      this.#crowdThreads.set(index, handle, end, { ...CROWD_THREAD, colour: look.threadColour });
+    });
   }
 
   /** Draw a string except for its bar, which is returned. */
@@ -235,14 +256,16 @@ export class Strings {
 
   #drawRing(limb: number, at: Vector3, motion: StringAnimation, state: StringState, look: Look, size: number): void {
     const held = state.puppeteer !== null;
-    const radius = (held ? 0.062 : 0.046 + 0.01 * motion.highlight) * size;
+    // Larger and glowing while the audience can pull it.
+    const isOpen = !held && state.isOpen === true;
+    const radius = (held || isOpen ? 0.062 : 0.046 + 0.01 * motion.highlight) * size;
     const strength = look.ringOpacity * (state.isDimmed ? DIMMED_SHARE : 1);
     this.#rings.set(limb, at, {
       colour: held ? look.puppeteerColours[motion.puppeteer] : look.ringColour,
       alpha: held ? 1 : strength + (1 - strength) * motion.highlight,
       radius,
       lineShare: held ? 0.035 : 0.026,
-      glow: held && look.dark ? 1 : 0,
+      glow: (held || isOpen) && look.dark ? 1 : 0,
     });
   }
 

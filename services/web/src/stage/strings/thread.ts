@@ -14,7 +14,6 @@ import {
 } from "three";
 import { MAX_LIMBS } from "../../wire/limbs";
 
-const MAX_THREADS = MAX_LIMBS;
 const SEGMENTS = 40;
 
 export interface Thread {
@@ -34,12 +33,13 @@ export class Threads {
   readonly #attributes: Record<"foot" | "top" | "tint" | "shape", InstancedBufferAttribute>;
   readonly #colour = new Color();
 
-  constructor() {
+  /** Draws at most `capacity` threads. */
+  constructor(capacity = MAX_LIMBS) {
     const ribbon = new PlaneGeometry(2, 1, 1, SEGMENTS);
     const geometry = new InstancedBufferGeometry();
     geometry.index = ribbon.index;
     geometry.setAttribute("position", ribbon.getAttribute("position"));
-    const attribute = (size: number) => new InstancedBufferAttribute(new Float32Array(MAX_THREADS * size), size);
+    const attribute = (size: number) => new InstancedBufferAttribute(new Float32Array(capacity * size), size);
     this.#attributes = { foot: attribute(3), top: attribute(3), tint: attribute(4), shape: attribute(3) };
     for (const [name, values] of Object.entries(this.#attributes)) geometry.setAttribute(name, values);
     geometry.instanceCount = 0;

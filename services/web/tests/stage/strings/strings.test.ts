@@ -127,3 +127,20 @@ describe("strings of several performers", () => {
     expect(values(strings, "shape", 0)[0]).toBeCloseTo(0.092, 6);
   });
 });
+
+test("pulls of the audience are drawn as a bounded number of threads", () => {
+  const strings = new Strings();
+  const puppet = { scale: 1, handle: (limb: number, out: Vector3) => out.set(limb, 1, 0) };
+  const view = { ground: 0, ceiling: 2.6, right: RIGHT, distanceScale: 1 };
+  const threads = () =>
+    (strings.group.children.filter(({ name }) => name === "threads") as Mesh<InstancedBufferGeometry>[]).map(
+      ({ geometry }) => geometry.instanceCount,
+    );
+  const open: StringState = { ...FREE, isOpen: true, crowdThreads: Array.from({ length: 16 }, () => new Vector3()) };
+  strings.update([puppet], [open, FREE, FREE, FREE], LOOKS.night, 0.016, view);
+  expect(threads()).toEqual([4, 16]);
+  strings.update([puppet, puppet], Array<StringState>(8).fill(open), LOOKS.night, 0.016, view);
+  expect(threads()).toEqual([8, 64]);
+  strings.update([puppet], [FREE, FREE, FREE, FREE], LOOKS.night, 0.016, view);
+  expect(threads()).toEqual([4, 0]);
+});
