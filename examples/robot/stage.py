@@ -13,6 +13,8 @@ from examples.robot.simulation import Pose, Robot
 SHOW_FPS = 60.0
 FIGURE_TIMEOUT_S = 60.0
 """Time for the first pose of the performer to arrive."""
+MAX_SLOWDOWN = 3.0
+"""Duration of a run at most, relative to the simulated time that was asked for: a busy machine leaves out frames."""
 
 
 class StageError(Exception):
@@ -31,7 +33,7 @@ class Follower:
         """Set once the performer's figure is known and the robot is built."""
         self.moved = asyncio.Event()
         """Set after each frame of the robot."""
-        self.frames = 0
+        self._progress = asyncio.Event()
         self._viewer, self._performer, self._free, self._on_fall = viewer, performer, free, on_fall
         self._last_us: int | None = None
 
@@ -50,8 +52,14 @@ class Follower:
         self._last_us = reference_us
         if self.robot.follow(pose, elapsed) and self._on_fall is not None:
             self._on_fall(self.robot.measurement.simulated_s)
-        self.frames += 1
         self.moved.set()
+        self._progress.set()
+
+    async def simulated(self, seconds: float) -> None:
+        """Wait until the robot has been simulated for `seconds`: pauses of a busy machine do not count."""
+        while self.robot is None or self.robot.measurement.simulated_s < seconds:
+            self._progress.clear()
+            await self._progress.wait()
 
     def _figure(self) -> Figure | None:
         performers = self._viewer.performers
@@ -70,7 +78,7 @@ async def run_robot(
     on_fall: Callable[[float], None] | None = None,
     stop: asyncio.Event | None = None,
 ) -> Robot:
-    """Let a robot follow a performer of a session for `seconds`, or until `stop` is set, and return it.
+    """Let a robot follow a performer of a session until `seconds` are simulated, or `stop` is set, and return it.
 
     With `beside`, the robot is a live performer of the session, that many metres to the performer's left. Raise
     `StageError` if the performer does not appear, `StreamEnded` if the session ends, `ServerProblem` if the server
@@ -78,7 +86,7 @@ async def run_robot(
     """
     viewer = Viewer(client.socket_url(f"/v1/sessions/{session}/stream"), token=client.token)
     follower = Follower(viewer, performer, free=free, on_fall=on_fall)
-    watching = asyncio.create_task(viewer.watch(seconds + FIGURE_TIMEOUT_S, follower.on_frame))
+    watching = asyncio.create_task(viewer.watch(MAX_SLOWDOWN * seconds + FIGURE_TIMEOUT_S, follower.on_frame))
     try:
         waiting = asyncio.create_task(follower.ready.wait())
         await asyncio.wait((watching, waiting), timeout=FIGURE_TIMEOUT_S, return_when=asyncio.FIRST_COMPLETED)
@@ -87,7 +95,7 @@ async def run_robot(
             watching.result()
         if follower.robot is None:
             raise StageError(f"Performer {performer} of session {session} has no pose. Is a motion on its stage?")
-        work: list[Coroutine[Any, Any, Any]] = [asyncio.sleep(seconds)]
+        work: list[Coroutine[Any, Any, Any]] = [follower.simulated(seconds)]
         if beside is not None:
             work.append(_show(client, session, follower, beside))
         if stop is not None:
