@@ -15,10 +15,12 @@ from typing import Any
 
 from tests.bench.contact_bonds import SCENES, measure_bonds
 from tests.bench.contact_feet import measure_feet
+from tests.bench.contact_robot import measure_robot
 
 PARTS: dict[str, Callable[[Path, int], dict[str, Any]]] = {
     "feet": lambda shared, _: measure_feet(shared),
     "bonds": lambda _, scenes: measure_bonds(scenes, os.cpu_count() or 1),
+    "robot": lambda *_: measure_robot(),
 }
 """Parts by name: functions of the folder of the recorded clips and the number of scenes."""
 
