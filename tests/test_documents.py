@@ -20,6 +20,7 @@ DOCUMENTS = [
     *(ROOT / "docs").glob("*.md"),
     *(ROOT / "deploy").rglob("*.md"),
     *(ROOT / "proto").glob("*.md"),
+    *(ROOT / "examples").rglob("*.md"),
 ]
 MAX_README_WORDS = 1200
 COMMAND_GROUPS = ("bench", "capture", "send")

@@ -17,12 +17,14 @@ from tests.bench.contact_bonds import SCENES, measure_bonds
 from tests.bench.contact_crowd import measure_crowd
 from tests.bench.contact_feet import measure_feet
 from tests.bench.contact_latency import measure_latency
+from tests.bench.contact_robot import measure_robot
 
 PARTS: dict[str, Callable[[Path, int], dict[str, Any]]] = {
     "feet": lambda shared, _: measure_feet(shared),
     "bonds": lambda _, scenes: measure_bonds(scenes, os.cpu_count() or 1),
     "latency": lambda _shared, _scenes: measure_latency(),
     "crowd": lambda _shared, _scenes: measure_crowd(),
+    "robot": lambda *_: measure_robot(),
 }
 """Parts by name: functions of the folder of the recorded clips and the number of scenes."""
 
