@@ -64,7 +64,7 @@ async def run_demo(seconds: float, options: dict[str, Any], *, quiet: bool = Fal
             session = await client.first_session()
             assert session is not None, "the demo has a session"
             if not quiet:
-                print(f"Watch it: {url}/?session={session}")
+                print(f"Watch it: {url}/?session={session}", flush=True)
             people = [asyncio.create_task(_pull(client, session, side)) for side in ("left", "right")]
             try:
                 figures = await run_session(client, session, seconds, options, quiet=quiet)
@@ -91,7 +91,7 @@ async def run_session(
 
     def report_fall(at: float) -> None:
         if not quiet:
-            print(f"{at:6.1f} s  the robot fell, and was set up again")
+            print(f"{at:6.1f} s  the robot fell, and was set up again", flush=True)
 
     stop, loop = asyncio.Event(), asyncio.get_running_loop()
     with contextlib.suppress(NotImplementedError, ValueError, RuntimeError):
