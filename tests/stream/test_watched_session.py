@@ -8,6 +8,7 @@ import pytest
 
 from bunraku.codec.container import pack_motion
 from bunraku.codec.motion_encoder import encode_motion
+from bunraku.marionette.crowd.summary import CrowdSummary
 from bunraku.messaging.bus import MemoryBus, NoResponse
 from bunraku.messaging.key_value import KeyValueView, MemoryKeyValueStore
 from bunraku.playout import timeline
@@ -20,7 +21,7 @@ from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.subprotocol import NOT_FOUND, SERVICE_RESTART, CloseConnection
-from bunraku.wire.messages import ChannelHeader, Description, Presence, Problem, TimelineState
+from bunraku.wire.messages import ChannelHeader, CrowdPulls, Description, Presence, Problem, Pull, TimelineState
 from bunraku.wire.overlay import Overlay
 from tests.stream.fake_transport import FakeTransport, parse_frames
 from tests.time_limit import HANG_TIMEOUT_S
@@ -91,6 +92,29 @@ async def test_one_subscription_serves_all_viewers_until_last_leaves(motion_stor
         viewer.on_close()
     assert "session.s.overlay" not in bus._handlers
     assert not watched._sessions
+
+
+async def test_pulls_of_viewers_are_summarised_for_the_owner_and_its_sample_is_sent(motion_store: MotionStore) -> None:
+    bus, summaries = MemoryBus(), asyncio.Queue[bytes]()
+    serve_session_state(bus)
+    bus.subscribe("session.s.crowd", summaries.put_nowait)
+    watched = WatchedSessions(bus, MemoryKeyValueStore(), motion_store, StreamContext.create(clock))
+    joined = [await join_viewer(watched) for _ in range(3)]
+    joined[0][0].on_message(Pull(1, [0.5, 0.0, 0.0]).pack())
+    presence = Presence(3, [], [None] * 4, crowd=[{"limb": 1, "policy": "median", "pulls": 0}])
+    bus.publish("session.s.presence", presence.pack())
+    for viewer, _ in joined[:2]:
+        viewer.on_message(Pull(1, [0.5, 0.0, 0.0]).pack())
+        viewer.on_message(Pull(0, [0.5, 0.0, 0.0]).pack())
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        _, limb, _, packed = msgpack.unpackb(await summaries.get())
+    assert (limb, CrowdSummary.unpack(packed).count) == (1, 2)
+    pulls = CrowdPulls(1, 2, [[0.5, 0.0, 0.0]])
+    bus.publish("session.s.pulls", pulls.pack())
+    assert pulls in joined[0][1].messages
+    for viewer, _ in joined:
+        viewer.on_close()
+    assert "session.s.pulls" not in bus._handlers
 
 
 async def test_slow_viewer_gets_newest_overlay_without_delaying_others(motion_store: MotionStore) -> None:

@@ -33,7 +33,9 @@ describe("crowd", () => {
     expect(viewer.pull(1, 0.5)).toBe(false);
     FakeWebSocket.last.accept();
     expect(viewer.pull(1, 0.5, -0.25, 0.125)).toBe(true);
-    expect(FakeWebSocket.last.sent.filter(({ name }) => name === "Pull")).toEqual([{ name: "Pull", limb: 1, place: [0.5, -0.25, 0.125] }]);
+    expect(FakeWebSocket.last.sent.filter(({ name }) => name === "Pull")).toEqual([
+      { name: "Pull", limb: 1, place: [0.5, -0.25, 0.125] },
+    ]);
     let changes = 0;
     viewer.addEventListener("pulls", () => changes++);
     const pulls = { name: "CrowdPulls", limb: 1, count: 2, places: [[0.5, 0, 0]] } as const;
