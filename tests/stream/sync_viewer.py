@@ -12,7 +12,7 @@ from bunraku.runtime.clock import clock
 from bunraku.stream.context import StreamContext
 from bunraku.stream.sync_group import SyncGroups
 from bunraku.stream.viewer_connection import ViewerConnection
-from bunraku.wire.messages import Data, TimelineState
+from bunraku.wire.messages import Data, Pull, TimelineState
 from tests.stream.fake_transport import FakeTransport
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera
@@ -43,6 +43,8 @@ class FakeViewerGroup:
         self.removed: list[ViewerConnection] = []
 
     def invalidate_writable(self) -> None: ...
+
+    def pull(self, viewer: ViewerConnection, message: Pull) -> None: ...
 
     def remove_viewer(self, viewer: ViewerConnection) -> None:
         self.removed.append(viewer)
