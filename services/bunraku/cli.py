@@ -24,6 +24,7 @@ from bunraku.cli_access import (
 )
 from bunraku.cli_bench import bench
 from bunraku.cli_capture import capture
+from bunraku.cli_crowd import crowd
 from bunraku.cli_inspect import inspect
 from bunraku.cli_library import edit, list_motions, reencode, rename, tag
 from bunraku.cli_send import send
@@ -55,6 +56,7 @@ app = typer.Typer(
 )
 app.command()(token)
 app.command()(share)
+app.command()(crowd)
 app.command()(inspect)
 app.command(name="list")(list_motions)
 app.command()(rename)
