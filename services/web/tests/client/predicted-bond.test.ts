@@ -76,7 +76,16 @@ class PlayedStage {
     const { holders, bonds } = this;
     const limbs = [...holders],
       asks = limbs.map(() => []);
-    session.socket.receive({ name: "Presence", live: null, bonds, crowd: null, viewers: 2, puppeteers: [], limbs, asks });
+    session.socket.receive({
+      name: "Presence",
+      live: null,
+      bonds,
+      crowd: null,
+      viewers: 2,
+      puppeteers: [],
+      limbs,
+      asks,
+    });
   }
 
   act([, name, action, limb, argument]: StageCase["events"][number]): void {
