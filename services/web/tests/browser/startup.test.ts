@@ -19,6 +19,8 @@ const DEFERRED_FILES = [
   /\/hands-/,
   /planted-feet-/,
   /edge-smoothing-/,
+  // what the solver of limbs shares with that of bonds
+  /point-/,
 ];
 
 /** Limit of the document and the scripts before the first frame. Each 10 kB delay it by 80 ms at 1 Mbit/s. */

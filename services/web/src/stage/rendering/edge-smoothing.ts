@@ -36,7 +36,7 @@ void main() {
   float centre = luma(colour);
   float low = min(centre, min(min(leftUp, rightUp), min(leftDown, rightDown)));
   float high = max(centre, max(max(leftUp, rightUp), max(leftDown, rightDown)));
-  vec4 lost = .5 * (colour - .25 * (leftUpColour + rightUpColour + leftDownColour + rightDownColour));
+  vec3 lost = .5 * (colour - .25 * (leftUpColour + rightUpColour + leftDownColour + rightDownColour)).rgb;
   // Along the edge: across the gradient of the luma.
   vec2 along = vec2(leftDown + rightDown - leftUp - rightUp, leftUp + leftDown - rightUp - rightDown);
   float flatness = max((leftUp + rightUp + leftDown + rightDown) * .03, .008);
@@ -45,7 +45,9 @@ void main() {
   vec4 far = .5 * near + .25 * (texture2D(picture, at - .5 * along) + texture2D(picture, at + .5 * along));
   float reached = luma(far);
   bool isEdge = high - low > max(.04, .125 * high);
-  gl_FragColor = isEdge ? (reached < low || reached > high ? near : far) + .4 * lost : colour + lost;
+  vec4 found = isEdge ? (reached < low || reached > high ? near : far) : colour;
+  // Colours are premultiplied: none exceeds its alpha.
+  gl_FragColor = vec4(clamp(found.rgb + (isEdge ? .4 : 1.) * lost, 0., found.a), found.a);
 }`;
 
 /** Distance to the pixels that a smoothed one is mixed of, in pixels. */
