@@ -63,6 +63,7 @@ APPS: dict[str, list[str]] = {
     ],
     "ingest": [
         "/v1/motions/{motion}/edits",
+        "/v1/motions/{motion}/encodings",
         "/v1/motions/{motion}/thumbnail",
         "/v1/motions",
         "/v1/motions/{motion}",

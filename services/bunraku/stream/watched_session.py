@@ -9,6 +9,7 @@ import secrets
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
+from functools import partial
 
 import msgpack
 
@@ -95,7 +96,8 @@ class WatchedSession:
         timeline, presence, overlay = _unpack_state(state)
         self._overlay: bytes | None = None if overlay is None else encode_frame(overlay)
         self._presence = encode_frame(presence)
-        self._crowd = CrowdRelay(source.replica, context.clock, self._publish_crowd)
+        # not a method of this object: without a reference cycle both are freed at once
+        self._crowd = CrowdRelay(source.replica, context.clock, partial(source.bus.publish, f"{self._subject}.crowd"))
         self._crowd.set_presence(_parse_presence(presence))
         self._timeline = _parse_timeline(timeline)
         self._on_timeline(timeline)
@@ -292,9 +294,6 @@ class WatchedSession:
     def pull(self, viewer: ViewerConnection, message: Pull) -> None:
         """Record a viewer's pull on a limb that is open to the crowd."""
         self._crowd.pull(viewer, message)
-
-    def _publish_crowd(self, summary: bytes) -> None:
-        self._source.bus.publish(f"{self._subject}.crowd", summary)
 
     def _on_pulls(self, message: bytes) -> None:
         """Send the crowd's pulls to the viewers on unconstrained links; others do without."""
