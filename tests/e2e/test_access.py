@@ -183,6 +183,14 @@ def test_role_grants_exactly_the_listed_routes(guarded: GuardedServer, role: Rol
                 assert (other.status_code, body_without_request_id(other)) == (403, body_without_request_id(response))
 
 
+@pytest.mark.parametrize(("role", "status"), [(Role.INGEST, 403), (Role.ADMIN, 200)])
+def test_motion_of_another_subject_is_encoded_again_by_admins_only(
+    guarded: GuardedServer, role: Role, status: int
+) -> None:
+    with httpx2.Client(base_url=guarded.url, headers=bearer_headers(make_token(role)), timeout=HANG_TIMEOUT_S) as http:
+        assert http.post(f"/v1/motions/{guarded.motion}/encodings").status_code == status
+
+
 async def read_until_closed(socket: ClientConnection) -> None:
     """Read until the server closes the connection."""
     async with asyncio.timeout(HANG_TIMEOUT_S):
