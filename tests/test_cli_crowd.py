@@ -4,6 +4,7 @@ import asyncio
 import json
 import zlib
 from pathlib import Path
+from typing import get_args
 
 import pytest
 from typer.testing import CliRunner
@@ -11,7 +12,9 @@ from websockets import Subprotocol
 from websockets.asyncio.client import connect
 
 from bunraku.cli import app
+from bunraku.cli_crowd import CrowdPolicyName
 from bunraku.client import Client
+from bunraku.marionette.crowd.policy import CrowdPolicy
 from bunraku.wire.messages import SUBPROTOCOL, Presence, unpack
 from tests.servers import make_bvh_clip
 from tests.time_limit import HANG_TIMEOUT_S
@@ -43,6 +46,10 @@ async def open_limbs(server: str, session: str, count: int) -> list[tuple[int, s
             if isinstance(message, Presence) and len(message.crowd or []) == count:
                 return [(entry["limb"], entry["policy"]) for entry in message.crowd or []]
     raise AssertionError("the stream ended")
+
+
+def test_policies_are_those_of_the_server() -> None:
+    assert get_args(CrowdPolicyName) == tuple(policy.value for policy in CrowdPolicy)
 
 
 def test_limbs_are_opened_and_closed(server: str, session: str) -> None:

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 
 import httpx2
@@ -67,6 +68,31 @@ async def test_interrupted_replacement_leaves_a_complete_motion(
         assert await context.motion_store.object_sizes(["m1"]) == [before.bytes]
         after = await operation.reencode("m1")
         assert after.bytes < before.bytes
+
+
+async def test_client_that_leaves_during_the_replacement_leaves_a_motion_of_known_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with open_context(Settings(data=tmp_path)) as context:
+        before = await store_old_motion(context)
+        put, has_begun, may_go_on = context.motion_store.put, asyncio.Event(), asyncio.Event()
+
+        async def put_slowly(motion_id: str, packed: bytes) -> None:
+            has_begun.set()
+            await may_go_on.wait()
+            await put(motion_id, packed)
+
+        monkeypatch.setattr(context.motion_store, "put", put_slowly)
+        running = asyncio.create_task(ReencodingOperation(context, WorkerSlots()).reencode("m1"))
+        await has_begun.wait()
+        running.cancel()
+        may_go_on.set()
+        await asyncio.wait((running,))
+        assert running.cancelled()
+        after = await context.catalogue.get_motion("m1")
+        assert after is not None
+        assert 0 < after.bytes < before.bytes
+        assert await context.motion_store.object_sizes(["m1"]) == [after.bytes]
 
 
 async def test_motion_that_is_removed_meanwhile_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
 from bunraku.http.admission import AdmissionLimit
@@ -43,4 +44,11 @@ class ReencodingOperation:
             def describe(description: dict[str, Any]) -> dict[str, Any]:
                 return {**description, "rates": rates}
 
-            return await replace_motion(self._context, motion_id, result.packed, describe)
+            replacement = asyncio.create_task(
+                replace_motion(self._context, motion_id, result.packed, describe), name=f"replace motion {motion_id}"
+            )
+            try:
+                return await asyncio.shield(replacement)
+            finally:
+                # a client that leaves now would leave an object of unknown size, which no quota counts
+                await asyncio.wait((replacement,))
