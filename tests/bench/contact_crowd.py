@@ -30,7 +30,8 @@ from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_overlay
 from bunraku.playout.session_log import SessionLog
 from bunraku.session.crowd_control import CROWD, CrowdControl
-from bunraku.session.stage import SessionStart, Stage
+from bunraku.session.session_start import Fittings, SessionStart
+from bunraku.session.stage import Stage
 from tests.marionette.bond.bonded_stage import FRAME_INTERVAL_US, BondedStage, random_dance
 from tests.session.joined_stage import stored_motion
 from tests.virtual_time import START_US, run_in_virtual_time
@@ -124,7 +125,11 @@ def _owner_seconds(rounds: list[list[bytes]], motion: StoredMotion) -> float:
         bus = MemoryBus()
         state = timeline.start(motion.id, motion.first_track.duration_us, clock())
         begin = time.process_time()
-        stage = Stage(SessionStart("s", motion, state, state.clock, crowd=((LEFT_HAND, "trimmed mean"),)), bus, clock)
+        stage = Stage(
+            SessionStart("s", motion, state, state.clock, fittings=Fittings({LEFT_HAND: "trimmed mean"}, {})),
+            bus,
+            clock,
+        )
         for messages in rounds:
             for message in messages:
                 bus.publish("session.s.crowd", message)

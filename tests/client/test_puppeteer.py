@@ -165,3 +165,25 @@ async def test_bond_lost_with_its_hands_is_requested_again(server: str, clip_fil
             await puppeteer.claim("left_hand")
             await puppeteer.target("left_hand", *TARGET)
             assert not puppeteer.bonds
+
+
+async def test_prop_is_taken_passed_and_laid_down(server: str, clip_file: Path) -> None:
+    async with Client(server) as client:
+        session = (await client.open_session((await client.upload(clip_file))["id"]))["id"]
+        await client.edit_session(session, props={"0": "fan", "4": "umbrella"})
+        async with Puppeteer(client, session, "Aiko") as aiko, Puppeteer(client, session, "Ben") as ben:
+            await aiko.claim("left_hand")
+            await ben.claim("right_hand")
+            await aiko.put(0, "left_hand")
+            with pytest.raises(ControlRefused, match="held"):
+                await ben.put(0, "right_hand")
+            with pytest.raises(ControlRefused, match="full"):
+                await ben.put(4, "left_hand")
+            await aiko.put(0, "right_hand")
+            with pytest.raises(ControlRefused, match="held"):
+                await aiko.lay_down(0, 0.0, 0.0)
+            await ben.lay_down(0, 1.0, -0.5, 7.0)
+        (fan, umbrella) = (await client.session(session))["props"]
+    assert (fan["prop"], fan["kind"], fan["limb"]) == (0, "fan", None)
+    assert fan["place"] == pytest.approx([1.0, -0.5, 7.0 - 2 * np.pi])
+    assert (umbrella["prop"], umbrella["limb"]) == (4, None)

@@ -3,6 +3,8 @@ from __future__ import annotations
 import msgpack
 import pytest
 
+from bunraku.motion.placement import Placement
+from bunraku.motion.prop import Prop, PropState
 from bunraku.playout import session_log
 from bunraku.playout.session_log import (
     CHUNK_DURATION_US,
@@ -125,3 +127,31 @@ def test_cut_or_foreign_messages_raise_corrupt_session_log(overlays: bytes) -> N
     log = SessionLog.unpack(MAGIC + msgpack.packb({"timelines": [], "overlays": overlays}))
     with pytest.raises(CorruptSessionLog, match="at byte 0"):
         list(log.messages())
+
+
+def test_props_are_those_of_the_last_change_before_a_time() -> None:
+    log = SessionLog()
+    held, laid = {0: Prop("fan", PropState(1))}, {0: Prop("fan", PropState(None, Placement(1.0, 2.0, 0.5)))}
+    log.add_props(10, held)
+    log.add_props(20, held)
+    log.add_props(30, laid)
+    for seen in (log, SessionLog.unpack(log.pack()), SessionLog.unpack(log.pack(29))):
+        assert seen.props_at(29) == held
+        assert seen.props_at(30) == seen.props_at(1 << 50) == laid
+    assert log.props_at(9) == {}
+    assert SessionLog.unpack(log.pack(31)).props_at(31) == laid
+    log.add_props(40 + LOG_DURATION_US, {})
+    assert log.props_at(20) == log.props_at(40) == laid
+
+
+def test_log_without_props_is_that_of_earlier_releases() -> None:
+    log = SessionLog()
+    log.add_props(10, {})
+    assert set(msgpack.unpackb(log.pack()[len(MAGIC) :])) == {"timelines", "overlays"}
+
+
+@pytest.mark.parametrize("props", [1, [[1]], [[1, [[0, ["fan"]]]]], [["a", []]], [[5, []], [1, 2]]])
+def test_log_with_damaged_props_is_rejected(props: object) -> None:
+    data = MAGIC + msgpack.packb({"timelines": [], "overlays": b"", "props": props})
+    with pytest.raises(CorruptSessionLog):
+        SessionLog.unpack(data)

@@ -12,7 +12,8 @@ from bunraku.runtime.clock import clock
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.session import puppeteer_input
 from bunraku.session.puppeteer_input import PuppeteerInput
-from bunraku.session.stage import SessionStart, Stage
+from bunraku.session.session_start import SessionStart
+from bunraku.session.stage import Stage
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Claim, Refusal, unpack
 from tests.session.joined_stage import JoinedPuppeteer, join_stage, stored_motion

@@ -20,11 +20,11 @@ from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.session.presence import PRESENCE_BURST
 from bunraku.session.puppeteer_roster import Puppeteer, SessionFull
 from bunraku.session.schema import SessionEdit
+from bunraku.session.session_start import SessionStart
 from bunraku.session.stage import (
     EDIT_LEAD_US,
     FRAME_INTERVAL_US,
     FRAMES_PER_MESSAGE,
-    SessionStart,
     Stage,
     load_bend_tables,
 )

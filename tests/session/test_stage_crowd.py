@@ -16,7 +16,8 @@ from bunraku.playout.session_log import SessionLog
 from bunraku.session.crowd_control import CROWD
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_registry import SessionRecord
-from bunraku.session.stage import SessionStart, Stage
+from bunraku.session.session_start import Fittings, SessionStart
+from bunraku.session.stage import Stage
 from bunraku.stream.crowd_relay import CrowdRelay
 from bunraku.wire.messages import Presence, Pull, unpack
 from bunraku.wire.overlay import Overlay
@@ -33,7 +34,7 @@ def test_pulls_of_two_replicas_move_an_open_limb_and_are_logged() -> None:
         await asyncio.to_thread(motion_decoder.warm_up)
         bus, motion = MemoryBus(), stored_motion("one", 5)
         state = timeline.start("one", motion.first_track.duration_us, clock())
-        stage = Stage(SessionStart("s", motion, state, state.clock, crowd=((1, "median"),)), bus, clock)
+        stage = Stage(SessionStart("s", motion, state, state.clock, fittings=Fittings({1: "median"}, {})), bus, clock)
         audience = StageMessages(bus)
         relays = [CrowdRelay(name, clock, lambda data: bus.publish("session.s.crowd", data)) for name in "ab"]
         for relay in relays:

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator
 from pathlib import Path
 
 import msgpack
@@ -9,6 +9,7 @@ import pytest
 
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
+from bunraku.motion.prop import PropKind
 from bunraku.playout import timeline
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
@@ -18,11 +19,12 @@ from bunraku.session import puppeteer_roster, stage_endpoint
 from bunraku.session.live.cast import Cast
 from bunraku.session.live.cast_store import CastStore
 from bunraku.session.schema import SessionEdit
-from bunraku.session.stage import SessionStart, Stage
+from bunraku.session.session_start import Fittings, SessionStart
+from bunraku.session.stage import Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
-from bunraku.wire.messages import Claim, TimelineState
+from bunraku.wire.messages import Claim, Put, TimelineState
 from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion
@@ -38,7 +40,14 @@ class FakeStageOwner:
         self.fails = False
         self.input_scheduler = InputScheduler(TURN_US)
         self.ended: list[str] = []
+        self._has_saved = asyncio.Event()
         self.casts: CastStore
+
+    async def wait_for_saves(self, count: int) -> None:
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while len(self.saved) < count:
+                self._has_saved.clear()
+                await self._has_saved.wait()
 
     def require_room(self, subject: str) -> None:
         assert subject is not None
@@ -51,10 +60,11 @@ class FakeStageOwner:
         stage: Stage,
         state: TimelineState,
         cast: Cast,  # noqa: ARG002
-        crowd: Mapping[int, str] | None = None,  # noqa: ARG002
+        fittings: Fittings | None = None,  # noqa: ARG002
     ) -> None:
         self.saved.append(state.pack())
         self.shown.append(stage.timeline.pack())
+        self._has_saved.set()
         if self.fails:
             raise ProblemError(503, "Session elsewhere", "another server has taken over this session")
 
@@ -220,3 +230,17 @@ async def test_join_of_a_replica_of_an_earlier_release(context: ServiceContext, 
     answer = await context.bus.request("session.s.join", msgpack.packb(["p1", "Aiko"]))
     assert msgpack.unpackb(answer) == {"answer": {"colour": 0}}
     assert [puppeteer.id for puppeteer in endpoint.stage.puppeteers] == ["p1"]
+
+
+async def test_moved_props_are_saved_for_a_server_that_takes_over(
+    context: ServiceContext, endpoint: StageEndpoint, owner: FakeStageOwner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage_endpoint, "PUPPETEER_HEARTBEAT_S", 0.01)
+    stage, connection = await join_stage(context, "Ada")
+    answer = await stage.edit(SessionEdit(props={"2": PropKind.FAN}))
+    assert [(entry["prop"], entry["kind"], entry["limb"]) for entry in answer["props"]] == [(2, "fan", None)]
+    owner.fails = True
+    stage.send(connection, Put(2, limb=1).pack())
+    await owner.wait_for_saves(4)
+    assert endpoint.stage.props.has_unsaved_moves
+    assert (await stage.describe())["props"][0]["limb"] == 1

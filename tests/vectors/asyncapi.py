@@ -51,8 +51,8 @@ CHANNELS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "/v1/sessions/{id}/control",
         "One puppeteer of a session.",
         (
-            *("Welcome", "Presence", "Grant", "Refusal", "Notice", "BondEnd", "Pong", "Problem"),
-            *("Ping", "Claim", "Release", "Alive", "Input", "Ask", "Bond"),
+            *("Welcome", "Presence", "Grant", "Refusal", "Notice", "BondEnd", "PropRefusal", "Pong", "Problem"),
+            *("Ping", "Claim", "Release", "Alive", "Input", "Ask", "Bond", "Put"),
         ),
     ),
     "performerInput": (

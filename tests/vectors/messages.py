@@ -35,7 +35,9 @@ from bunraku.wire.messages import (
     Pong,
     Presence,
     Problem,
+    PropRefusal,
     Pull,
+    Put,
     Refusal,
     Release,
     Report,
@@ -167,6 +169,18 @@ def make_vectors() -> dict[str, Any]:
         Pull(1, [0.5, -0.25, 0.125]),
         CrowdPulls(1, 9_000, [[0.5, -0.25, 0.125], [-0.75, 0.25, 0.375]]),
         CrowdPulls(6, 0, []),
+        Presence(
+            1,
+            [],
+            [None] * 4,
+            props=[
+                {"prop": 0, "kind": "fan", "limb": 1, "place": [0.5, -0.25, 0.125]},
+                {"prop": 7, "kind": "ball", "limb": None, "place": [-1.5, 2.25, -3.125]},
+            ],
+        ),
+        Put(7, limb=5),
+        Put(0, place=[0.5, -0.25, 1.5]),
+        PropRefusal(7, "held"),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     live = Live(NOW_US, 2, {0: LiveBlock(8_000, b"ab"), 1: LiveBlock(4_000, b"c")}).pack()
@@ -210,6 +224,10 @@ def make_vectors() -> dict[str, Any]:
         "a pull of two numbers": bytes([74]) + msgpack.packb({"limb": 0, "place": [0.5, 0.5]}),
         "a pull that is not a number": bytes([74]) + msgpack.packb({"limb": 0, "place": [0.5, float("nan"), 0.5]}),
         "a pull of a limb past the last": bytes([74]) + msgpack.packb({"limb": 16, "place": [0.5, 0.5, 0.5]}),
+        "a prop put nowhere": bytes([75]) + msgpack.packb({"prop": 0}),
+        "a prop put at two places": bytes([75]) + msgpack.packb({"prop": 0, "limb": 1, "place": [0.0, 0.0, 0.0]}),
+        "a prop past the last": bytes([75]) + msgpack.packb({"prop": 8, "limb": 1}),
+        "a prop put beyond the stage": bytes([75]) + msgpack.packb({"prop": 0, "place": [0.0, 100.5, 0.0]}),
         "binary in place of text": bytes([8]) + msgpack.packb({"title": b"a", "detail": "b"}),
         "fewer lists of asks than limbs": bytes([6])
         + msgpack.packb({"viewers": 0, "puppeteers": [], "limbs": [None] * 4, "asks": [[]] * 3}),

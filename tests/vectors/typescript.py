@@ -66,7 +66,7 @@ def _fields(schema: dict[str, Any], named: dict[str, dict[str, Any]]) -> list[st
     lines: list[str] = []
     for name, field in schema["properties"].items():
         # an absent list is empty, unless an empty one is never sent
-        is_list = field["type"] == "array" and "minItems" not in field
+        is_list = field.get("type") == "array" and "minItems" not in field
         is_nullable = name not in schema["required"] and "default" not in field and not is_list
         comment = _comment(field["description"], "  ") if "description" in field else ""
         lines.append(f"{comment}  {name}: {_type_of(field, named)}{' | null' if is_nullable else ''};\n")

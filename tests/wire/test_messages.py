@@ -32,6 +32,7 @@ from bunraku.wire.messages import (
     Presence,
     Problem,
     Pull,
+    Put,
     Refusal,
     Release,
     Report,
@@ -204,6 +205,6 @@ def test_lowest_overlay_number_is_accepted() -> None:
 def test_types_are_unique_and_client_types_start_at_64() -> None:
     types = [kind.TYPE for kind in messages.Message.__args__]
     assert len(set(types)) == len(types)
-    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull, Input, Sample}
+    client = {Ping, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull, Put, Input, Sample}
     assert {kind for kind in messages.Message.__args__ if kind.TYPE >= 64} == client
     assert {*messages.FIXED_MESSAGES, *messages.MAP_MESSAGES} == set(messages.Message.__args__)

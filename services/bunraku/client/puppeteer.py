@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
 from collections.abc import Callable
-from typing import Self
+from typing import Any, Self
 from urllib.parse import quote
 
 from websockets.asyncio.client import ClientConnection, connect
@@ -29,6 +30,8 @@ from bunraku.wire.messages import (
     Notice,
     Presence,
     Problem,
+    PropRefusal,
+    Put,
     Refusal,
     Release,
     Welcome,
@@ -69,6 +72,8 @@ class Puppeteer:
         """Last input of each held limb: kind and values."""
         self._lost_limbs: set[int] = set()
         """Lost limbs with a pending claim."""
+        self._prop_refusals: dict[int, str] = {}
+        """Reason of the last refusal to move each prop, by number."""
         self._requested_bonds: set[tuple[int, int]] = set()
         """Bonds at the request of this puppeteer, until they end otherwise than by a loss of its limbs."""
         self._lost_bonds: set[tuple[int, int]] = set()
@@ -182,12 +187,42 @@ class Puppeteer:
             await self._wait_until(lambda: pair not in self.bonds)
 
     async def _wait_until(self, is_settled: Callable[[], bool]) -> None:
-        """Wait for a message after which a request for a bond is settled; raise `ControlRefused` if none comes."""
+        """Wait for a message after which a request is settled; raise `ControlRefused` if none comes."""
         try:
             async with asyncio.timeout(ANSWER_TIMEOUT_S), self._presence_changed:
                 await self._presence_changed.wait_for(is_settled)
         except TimeoutError:
-            raise ControlRefused(f"no answer for a bond: {self._close_reason}") from None
+            raise ControlRefused(f"no answer: {self._close_reason}") from None
+
+    async def put(self, prop: int, limb: str | int) -> None:
+        """Put a prop of the session (`presence.props`) into a hand; raise `ControlRefused` if the session refuses.
+
+        The prop must be free or in a held hand. The hand must be held or free, or any to pass on what is in a held one.
+        """
+        number = limb_number(limb)
+        await self._put(Put(prop, limb=number), lambda entry: entry["limb"] == number)
+
+    async def lay_down(self, prop: int, x: float, z: float, turn: float = 0.0) -> None:
+        """Lay a prop on the floor; raise `ControlRefused` if the session refuses.
+
+        `x` and `z` in metres, `turn` in radians about y from z towards x; stage frame.
+        """
+        place = [x, z, math.remainder(turn, math.tau)]
+        await self._put(
+            Put(prop, place=place),
+            lambda entry: entry["limb"] is None and all(map(math.isclose, entry["place"], place)),
+        )
+
+    async def _put(self, request: Put, is_there: Callable[[dict[str, Any]], bool]) -> None:
+        def has_arrived() -> bool:
+            props = (self.presence.props if self.presence is not None else None) or []
+            return any(entry["prop"] == request.prop and is_there(entry) for entry in props)
+
+        self._prop_refusals.pop(request.prop, None)
+        await self._send(request.pack())
+        await self._wait_until(lambda: request.prop in self._prop_refusals or has_arrived())
+        if (reason := self._prop_refusals.get(request.prop)) is not None:
+            raise ControlRefused(f"prop {request.prop} stays where it is: {reason}")
 
     def _bond_end_reason(self, pair: tuple[int, int]) -> str | None:
         end = self.bond_end
@@ -244,16 +279,18 @@ class Puppeteer:
                     await self._on_refusal(message)
                 elif isinstance(message, Notice):
                     self.notice = message
-                elif isinstance(message, Presence | BondEnd):
+                elif isinstance(message, Presence | BondEnd | PropRefusal):
                     await self._on_change(message)
                 elif isinstance(message, Problem):
                     self._close_reason = f"{message.title}: {message.detail}"
         self._welcome.set()
 
-    async def _on_change(self, message: Presence | BondEnd) -> None:
+    async def _on_change(self, message: Presence | BondEnd | PropRefusal) -> None:
         async with self._presence_changed:
             if isinstance(message, Presence):
                 self.presence = message
+            elif isinstance(message, PropRefusal):
+                self._prop_refusals[message.prop] = message.reason
             else:
                 self.bond_end = message
                 self._on_bond_end(_ordered(*message.limbs), message.reason)

@@ -1,22 +1,27 @@
-"""Log of what the viewers of a session saw: its timelines, the overlays of its limbs and the poses of live performers.
+"""Log of what the viewers of a session saw: its timelines, the overlays of its limbs, the poses of live performers and
+the props.
 
-The latter are the messages that the stage published, so a replay gives the poses of the viewers to the last bit. The
-log covers the last `LOG_DURATION_US`, the longest recording with a margin; what is older is dropped.
+Overlays and poses are the messages that the stage published, so a replay gives the poses of the viewers to the last
+bit. The log covers the last `LOG_DURATION_US`, the longest recording with a margin; what is older is dropped.
 
-As bytes: "bunraku.log/3", then a msgpack map with `timelines`, a list of messages, and `overlays`, Overlay and Live
-messages with their lengths (u16) before them.
+As bytes: "bunraku.log/3", then a msgpack map with `timelines`, a list of messages, `overlays`, Overlay and Live
+messages with their lengths (u16) before them, and, if there are any, `props`, a list of [clock time, props by number].
 """
 
 from __future__ import annotations
 
 import struct
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import Self
+from itertools import islice
+from operator import itemgetter
+from typing import Any, Self
 
 import msgpack
 
+from bunraku.motion.prop import Prop
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.live import Live
 from bunraku.wire.messages import TimelineState, unpack
@@ -30,6 +35,8 @@ MAX_LOG_BYTES = 20 << 20
 """Bound of the messages: in `LOG_DURATION_US`, sixteen controlled limbs at the full frame rate have 12 MB, four live
 performers 7 MB."""
 MAX_TIMELINES = 10_000
+MAX_PROP_CHANGES = 14_000
+"""Bound of the changes of props: twenty per second in `LOG_DURATION_US`."""
 
 _LENGTH = struct.Struct("<H")
 
@@ -52,6 +59,7 @@ class SessionLog:
 
     def __init__(self) -> None:
         self.timelines: deque[TimelineState] = deque(maxlen=MAX_TIMELINES)
+        self._props: deque[tuple[int, dict[int, Prop]]] = deque([(0, {})], maxlen=MAX_PROP_CHANGES)
         self._chunks: deque[_Chunk] = deque()
         self._message_bytes = 0
 
@@ -64,6 +72,19 @@ class SessionLog:
         """Add a timeline of the session."""
         self.timelines.append(state)
         self._drop_before(state.clock - LOG_DURATION_US)
+
+    def add_props(self, clock: int, props: dict[int, Prop]) -> None:
+        """Add the props from a clock time on, by number; times ascend."""
+        if props != self._props[-1][1]:
+            self._props.append((clock, props))
+            self._drop_before(clock - LOG_DURATION_US)
+
+    def props_at(self, clock: int) -> dict[int, Prop]:
+        """Return the props at a clock time, by number."""
+        return self._props[self._props_index(clock)][1]
+
+    def _props_index(self, clock: int) -> int:
+        return max(bisect_right(self._props, clock, key=itemgetter(0)) - 1, 0)
 
     def add_message(self, due_us: int, message: bytes) -> None:
         """Add a published Overlay or Live message, whose last frame is due at `due_us`; due times ascend."""
@@ -90,12 +111,16 @@ class SessionLog:
         """Return the log as bytes, without what viewers saw before `begin_us`."""
         states = list(self.timelines)
         first = max((index for index, state in enumerate(states) if state.clock <= begin_us), default=0)
-        packed: bytes = msgpack.packb(
-            {
-                "timelines": [state.pack() for state in states[first:]],
-                "overlays": b"".join(chunk.messages for chunk in self._chunks if chunk.end_us >= begin_us),
-            }
-        )
+        values: dict[str, Any] = {
+            "timelines": [state.pack() for state in states[first:]],
+            "overlays": b"".join(chunk.messages for chunk in self._chunks if chunk.end_us >= begin_us),
+        }
+        if len(self._props) > 1 or self._props[0][1]:
+            values["props"] = [
+                [clock, [[number, prop.to_values()] for number, prop in props.items()]]
+                for clock, props in islice(self._props, self._props_index(begin_us), None)
+            ]
+        packed: bytes = msgpack.packb(values)
         return MAGIC + packed
 
     @classmethod
@@ -111,6 +136,8 @@ class SessionLog:
                     raise CorruptSessionLog("session log rejected: a message of `timelines` is not a timeline")
                 log.timelines.append(state)
             log._chunks.append(_Chunk(0, 1 << 63, bytearray(values["overlays"])))
+            for clock, props in values.get("props", []):
+                log.add_props(clock, {number: Prop.from_values(prop) for number, prop in props})
         except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
             raise CorruptSessionLog(f"session log rejected: {error}") from error
         return log
@@ -121,6 +148,8 @@ class SessionLog:
             self._drop_chunk()
         while len(self.timelines) > 1 and self.timelines[1].clock <= begin_us:
             self.timelines.popleft()
+        while len(self._props) > 1 and self._props[1][0] <= begin_us:
+            self._props.popleft()
 
     def _drop_chunk(self) -> None:
         self._message_bytes -= len(self._chunks.popleft().messages)

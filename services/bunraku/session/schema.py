@@ -13,6 +13,7 @@ from bunraku.marionette.crowd.policy import CrowdPolicy
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.placement import Placement
+from bunraku.motion.prop import MAX_PROPS, PropKind
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, TIP_JOINTS, Figure
 from bunraku.runtime.problem import ProblemError
@@ -24,6 +25,8 @@ MAX_BONE_M = 3.0
 
 LimbKey = Annotated[str, Field(pattern=rf"^({'|'.join(LIMBS)}|\d|1[0-5])$")]
 """Name of a limb of the first performer, or number of a limb in decimal."""
+PropKey = Annotated[str, Field(pattern=rf"^[0-{MAX_PROPS - 1}]$")]
+"""Number of a prop in decimal."""
 
 
 class NewSession(BaseModel):
@@ -36,7 +39,7 @@ class NewSession(BaseModel):
 
 
 class SessionEdit(BaseModel):
-    """Edits of a session's timeline and of its open limbs; omitted fields stay unchanged."""
+    """Edits of a session's timeline, its open limbs and its props; omitted fields stay unchanged."""
 
     model_config = ConfigDict(extra="forbid")
     playing: bool | None = None
@@ -52,11 +55,21 @@ class SessionEdit(BaseModel):
         ),
     ] = {}
 
+    props: Annotated[
+        dict[PropKey, PropKind | None],
+        Field(max_length=MAX_PROPS, description="kind of each prop to bring on the stage, by number; null removes it"),
+    ] = {}
+
     def open_limbs(self, before: Mapping[int, str]) -> dict[int, str]:
         """Return the policies of the open limbs after this edit, by number."""
         edits = {LIMBS.index(key) if key in LIMBS else int(key): policy for key, policy in self.crowd.items()}
         changed = {**before, **{limb: policy and policy.value for limb, policy in edits.items()}}
         return {limb: policy for limb, policy in changed.items() if policy is not None}
+
+    def prop_kinds(self, before: Mapping[int, str]) -> dict[int, str]:
+        """Return the kinds of the props after this edit, by number."""
+        changed = {**before, **{int(key): kind and kind.value for key, kind in self.props.items()}}
+        return {number: kind for number, kind in changed.items() if kind is not None}
 
 
 Vector = Annotated[list[FiniteFloat], Field(min_length=3, max_length=3)]

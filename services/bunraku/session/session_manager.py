@@ -11,7 +11,6 @@ import asyncio
 import contextlib
 import logging
 import secrets
-from collections.abc import Mapping
 from typing import Any
 
 from bunraku.codec.container import StoredMotion
@@ -28,7 +27,8 @@ from bunraku.session.counters import SessionCounters
 from bunraku.session.live.cast import Cast
 from bunraku.session.live.cast_store import CastStore
 from bunraku.session.session_registry import RegisteredSession, SessionLost, SessionRecord, SessionRegistry
-from bunraku.session.stage import SessionStart, Stage, load_bend_tables
+from bunraku.session.session_start import Fittings, SessionStart
+from bunraku.session.stage import Stage, load_bend_tables
 from bunraku.session.stage_endpoint import StageEndpoint, session_json
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.wire.messages import TimelineState
@@ -157,9 +157,9 @@ class SessionManager:
         return stored
 
     async def save_record(
-        self, stage: Stage, state: TimelineState, cast: Cast, crowd: Mapping[int, str] | None = None
+        self, stage: Stage, state: TimelineState, cast: Cast, fittings: Fittings | None = None
     ) -> None:
-        """Save a stage with its next timeline, cast and open limbs (None: the present ones).
+        """Save a stage with its next timeline, cast and fittings (None: the present ones).
 
         Raises `ProblemError` if the session has ended or another replica owns it now.
         """
@@ -169,15 +169,10 @@ class SessionManager:
                 # closed meanwhile; the session was taken over again, with another stage
                 raise _lost_problem(SessionLost(stage.id, has_ended=False))
             try:
-                crowd = stage.crowd.policies if crowd is None else crowd
-                record = SessionRecord(
-                    self._registry.replicas.id,
-                    stage.created,
-                    state.pack(),
-                    stage.subject,
-                    cast,
-                    tuple(crowd.items()),
+                record = _record_of(stage, fittings)._replace(
+                    owner=self._registry.replicas.id, timeline=state.pack(), cast=cast
                 )
+                stage.props.has_unsaved_moves = False
                 endpoint.revision = await self._registry.save(stage.id, record, endpoint.revision)
             except SessionLost as lost:
                 await self._close_stage(stage.id)
@@ -385,7 +380,8 @@ class SessionManager:
         if confirmed is None:
             return
         record = claimed.record
-        start = SessionStart(session, stored, state, record.created_us, record.subject, record.cast, record.crowd)
+        fittings = Fittings(dict(record.crowd), dict(record.props))
+        start = SessionStart(session, stored, state, record.created_us, record.subject, record.cast, fittings)
         (await self._add_stage(start, confirmed.revision)).announce()
         self.counters.sessions["taken over",] += 1
         _log.warning("session %s taken over from another server", session)
@@ -422,10 +418,11 @@ def create_session_id() -> str:
     return secrets.token_hex(9)
 
 
-def _record_of(stage: Stage) -> SessionRecord:
-    """Return the record of a session without an owner."""
-    crowd = tuple(stage.crowd.policies.items())
-    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject, stage.cast, crowd)
+def _record_of(stage: Stage, fittings: Fittings | None = None) -> SessionRecord:
+    """Return the record of a session without an owner, with its present fittings or others."""
+    shown = fittings or stage.fittings
+    crowd, props = tuple(shown.crowd.items()), tuple(shown.props.items())
+    return SessionRecord(NO_REPLICA, stage.created, stage.timeline.pack(), stage.subject, stage.cast, crowd, props)
 
 
 def _lost_problem(lost: SessionLost) -> ProblemError:

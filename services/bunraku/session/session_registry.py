@@ -17,6 +17,7 @@ import msgpack
 from bunraku.messaging.bus import Subscription
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, KeyValueStore, KeyValueView, RevisionConflict
 from bunraku.messaging.replica_registry import DEFAULT_TIMING, ReplicaRegistry, ReplicaTiming
+from bunraku.motion.prop import Prop
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.wire.messages import TimelineState, unpack
@@ -44,19 +45,24 @@ class SessionRecord(NamedTuple):
     """Live performers; none in records of earlier releases."""
     crowd: tuple[tuple[int, str], ...] = ()
     """Limbs that are open to the crowd, and their policies; none in records of earlier releases."""
+    props: tuple[tuple[int, Prop], ...] = ()
+    """Props by number; none in records of earlier releases."""
 
     def pack(self) -> bytes:
         """Return the fields as MessagePack.
 
-        Without live performers, open limbs and a subject, replicas of earlier releases can read them.
+        Without live performers, open limbs, props and a subject, replicas of earlier releases can read them.
         """
         fields: list[Any] = [self.owner, self.created_us, self.timeline]
-        if self.subject or self.cast.members or self.crowd:
-            fields.append(self.subject)
-        if self.cast.members or self.crowd:
-            fields.append(self.cast.to_values())
-        if self.crowd:
-            fields.append(self.crowd)
+        optional = [
+            (self.subject, self.subject),
+            (self.cast.members, self.cast.to_values()),
+            (self.crowd, self.crowd),
+            (self.props, [[number, prop.to_values()] for number, prop in self.props]),
+        ]
+        while optional and not optional[-1][0]:
+            optional.pop()
+        fields += [value for _, value in optional]
         packed: bytes = msgpack.packb(fields)
         return packed
 
@@ -68,7 +74,11 @@ class SessionRecord(NamedTuple):
             raise ValueError("not a record of a session")
         crowd = values[5] if len(values) > 5 and isinstance(values[5], list) else []
         record = cls(*values[:4], *map(Cast.from_values, values[4:5]))
-        record = record._replace(crowd=tuple((limb, policy) for limb, policy in crowd))
+        props = values[6] if len(values) > 6 and isinstance(values[6], list) else []
+        record = record._replace(
+            crowd=tuple((limb, policy) for limb, policy in crowd),
+            props=tuple((number, Prop.from_values(prop)) for number, prop in props),
+        )
         record.parse_timeline()
         return record
 

@@ -13,7 +13,6 @@ import contextlib
 import secrets
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import msgpack
 
@@ -22,6 +21,8 @@ from bunraku.marionette.marionettes import Marionettes, OverlayJoints
 from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, LimbRefusal
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.bus import Bus, Subscription
+from bunraku.motion.placement import Placement
+from bunraku.motion.prop import Prop
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.block_store import Pose
@@ -32,12 +33,14 @@ from bunraku.session.bond_control import BondControl
 from bunraku.session.counters import SessionCounters
 from bunraku.session.crowd_control import CrowdControl
 from bunraku.session.frame_rate import FrameRateControl
-from bunraku.session.live.cast import EMPTY_CAST, Cast
+from bunraku.session.live.cast import Cast
 from bunraku.session.live.live_performers import LivePerformers
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.presence import PresencePublisher
+from bunraku.session.prop_control import PropControl
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.session.schema import SessionEdit
+from bunraku.session.session_start import Fittings, SessionStart
 from bunraku.session.stall import EventLoopStallCompensation
 from bunraku.wire import messages
 from bunraku.wire.live import Sample
@@ -49,6 +52,7 @@ from bunraku.wire.messages import (
     Grant,
     Input,
     Presence,
+    Put,
     Refusal,
     Release,
     TimelineState,
@@ -65,24 +69,6 @@ FRAMES_PER_MESSAGE = 2
 """Frames of one message: packets, not bytes, fill a constrained link."""
 MAX_CATCH_UP_FRAMES = 6
 """Frames published late after a stall; earlier ones are skipped."""
-
-
-@dataclass(frozen=True, slots=True)
-class SessionStart:
-    """Session from which a stage starts: a new one, or one of another replica."""
-
-    id: str
-    motion: StoredMotion
-    timeline: TimelineState
-    """Timeline of the motion."""
-    created_us: int
-    """Clock time of the creation."""
-    subject: str = ""
-    """Subject of the token that opened the session."""
-    cast: Cast = EMPTY_CAST
-    """Live performers."""
-    crowd: tuple[tuple[int, str], ...] = ()
-    """Limbs that are open to the crowd, and their policies."""
 
 
 class Stage:
@@ -124,7 +110,8 @@ class Stage:
         self._ownership = self._marionettes.ownership
         self._bonds = BondControl(self._ownership, self.puppeteers)
         self.crowd = CrowdControl(self._ownership, lambda pulls: bus.publish(f"session.{start.id}.pulls", pulls))
-        self.crowd.set_policies(dict(start.crowd), clock())
+        self.crowd.set_policies(start.fittings.crowd, clock())
+        self.props = PropControl(start.fittings.props)
         self._set_motion(start.motion)
         subject = f"session.{start.id}"
         self._subscriptions: list[Subscription] = [
@@ -188,14 +175,15 @@ class Stage:
 
     @property
     def presence(self) -> Presence:
-        """Viewer count, puppeteers, limb holders, requests for limbs and bonds."""
+        """Viewer count, puppeteers, limb holders, requests for limbs, bonds, open limbs and props."""
         puppeteers = [{"id": p.id, "name": p.name, "colour": p.colour} for p in self.puppeteers]
         asks = [list(limb) for limb in self._ownership.asks()]
         live = self.live.presence() or None
         bonds = [list(pair) for pair in self._ownership.bonds] or None
         crowd = self.crowd.presence() or None
         viewers = self.presence_publisher.viewer_count
-        return Presence(viewers, puppeteers, list(self.holders), asks, live, bonds, crowd)
+        props = self.props.presence() or None
+        return Presence(viewers, puppeteers, list(self.holders), asks, live, bonds, crowd, props)
 
     def plan_edit(self, edit: SessionEdit, motion: StoredMotion | None) -> TimelineState | None:
         """Return the timeline after an edit, due `EDIT_LEAD_US` from now; None if the edit changes nothing.
@@ -234,6 +222,7 @@ class Stage:
         for limb, holder in self._marionettes.set_figures(_performer_figures(motion)):
             if (puppeteer := self.puppeteers.get(holder)) is not None:
                 puppeteer.send_limb_lost(limb, now)
+        self.props.drop_beyond(len(self.holders))
         self._set_motion(motion)
 
     def join(
@@ -288,6 +277,9 @@ class Stage:
                 self.presence_publisher.publish()
         elif isinstance(message, Bond):
             if self._bonds.receive(puppeteer, message, now):
+                self.presence_publisher.publish()
+        elif isinstance(message, Put):
+            if self.props.receive(puppeteer, message, self.holders):
                 self.presence_publisher.publish()
         elif isinstance(message, Input):
             self._receive_input(puppeteer, message, now)
@@ -345,6 +337,7 @@ class Stage:
 
     def _send_presence(self) -> None:
         packed = self.presence.pack()
+        self.log.add_props(self._clock(), self.props.all)
         self._bus.publish(f"session.{self.id}.presence", packed)
         for puppeteer in self.puppeteers:
             puppeteer.send(packed)
@@ -356,9 +349,21 @@ class Stage:
     def _receive_viewer_count(self, message: bytes) -> None:
         self.presence_publisher.report_viewers(*msgpack.unpackb(message)[:2])
 
-    def open_limbs(self, policies: Mapping[int, str]) -> None:
-        """Open these limbs to the crowd, by number with their merge policies, and close all others."""
-        if self.crowd.set_policies(policies, self._clock()):
+    @property
+    def fittings(self) -> Fittings:
+        """Open limbs and props."""
+        return Fittings(self.crowd.policies, self.props.all)
+
+    def plan_props(self, kinds: Mapping[int, str]) -> dict[int, Prop]:
+        """Return the props of these kinds, by number; new ones lie before the first performer. Pass them to `fit`."""
+        performer = self._motion.performers[0]
+        x, z, turn = performer.placement
+        return self.props.plan(kinds, Placement(x, z, turn + performer.front))
+
+    def fit(self, fittings: Fittings) -> None:
+        """Open and close limbs to the crowd, and bring and remove props; a prop that stays, stays where it is now."""
+        has_changes = self.crowd.set_policies(fittings.crowd, self._clock())
+        if self.props.bring(fittings.props) or has_changes:
             self.presence_publisher.publish()
 
     def _receive_crowd(self, message: bytes) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable
 from typing import Any, Protocol
 
 import msgpack
@@ -23,6 +23,7 @@ from bunraku.messaging.bus import Subscription
 from bunraku.messaging.recording_request import MAX_RECORDING_S
 from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US
 from bunraku.playout.timeline import position_at
+from bunraku.runtime.availability import BackendUnavailable
 from bunraku.runtime.context import ServiceContext
 from bunraku.runtime.input_scheduler import InputScheduler
 from bunraku.runtime.problem import ProblemError
@@ -32,6 +33,7 @@ from bunraku.session.live.performer_endpoint import PerformerEndpoint
 from bunraku.session.puppeteer_input import PuppeteerInput
 from bunraku.session.puppeteer_roster import SessionFull
 from bunraku.session.schema import SessionEdit
+from bunraku.session.session_start import Fittings
 from bunraku.session.stage import EDIT_LEAD_US, Stage, load_bend_tables
 from bunraku.wire.messages import TimelineState
 
@@ -62,9 +64,9 @@ class StageOwner(Protocol):
         """Return the motion of a cast; raises `ProblemError`."""
 
     async def save_record(
-        self, stage: Stage, state: TimelineState, cast: Cast, crowd: Mapping[int, str] | None = None
+        self, stage: Stage, state: TimelineState, cast: Cast, fittings: Fittings | None = None
     ) -> None:
-        """Save a stage with its next timeline, cast and open limbs, so that another replica can continue it."""
+        """Save a stage with its next timeline, cast and fittings, so that another replica can continue it."""
 
     async def end_session(self, session: str) -> None:
         """End a session."""
@@ -172,10 +174,10 @@ class StageEndpoint:
             motion = await self._owner.load_cast(cast)
             await asyncio.to_thread(load_bend_tables, motion)
         state = stage.plan_edit(edit, motion)
-        crowd = edit.open_limbs(stage.crowd.policies)
+        fittings = Fittings(edit.open_limbs(stage.crowd.policies), stage.plan_props(edit.prop_kinds(stage.props.kinds)))
         # saved before it is shown: a server that takes over continues what viewers have seen
-        await self._owner.save_record(stage, state or stage.timeline, cast, crowd)
-        stage.open_limbs(crowd)
+        await self._owner.save_record(stage, state or stage.timeline, cast, fittings)
+        stage.fit(fittings)
         if state is not None:
             if motion is not None and stage.cast.members:
                 self._performers.replace(stage.cast)
@@ -226,8 +228,20 @@ class StageEndpoint:
         if packed is None:
             self._inputs.pop(puppeteer_id, None)
 
+    async def _save_moves(self) -> None:
+        """Save where puppeteers have put the props; if that fails, the next call tries again."""
+        stage = self.stage
+        if not stage.props.has_unsaved_moves:
+            return
+        try:
+            async with self._edit_lock:
+                await self._owner.save_record(stage, stage.timeline, stage.cast)
+        except (ProblemError, BackendUnavailable) as error:
+            stage.props.has_unsaved_moves = True
+            _log.warning("session %s: the places of its props are not saved: %s", stage.id, error)
+
     async def _expire_participants(self) -> None:
-        """Remove the puppeteers and viewers whose replica has died, until cancelled."""
+        """Remove the puppeteers and viewers whose replica has died, and save moved props, until cancelled."""
         while True:
             begin = self._clock()
             await asyncio.sleep(PUPPETEER_HEARTBEAT_S)
@@ -237,6 +251,7 @@ class StageEndpoint:
             self.stage.presence_publisher.expire_viewer_counts(VIEWER_COUNT_TIMEOUT_US, stalled_us)
             self._performers.expire(stalled_us)
             await self._performers.maintain()
+            await self._save_moves()
             for puppeteer in self.stage.puppeteers:
                 puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:
@@ -261,4 +276,5 @@ def session_json(stage: Stage, now: int) -> dict[str, Any]:
         "puppeteers": presence.puppeteers,
         "limbs": presence.limbs,
         "crowd": presence.crowd or [],
+        "props": presence.props or [],
     }

@@ -11,6 +11,11 @@ MAX_SHOWN_PULLS = 16
 """Most pulls of a crowd on one limb that viewers are sent."""
 
 
+def is_hand(limb: int) -> bool:
+    """Return whether the limb of this number is a hand."""
+    return limb % len(LIMBS) < 2
+
+
 def limb_number(limb: str | int) -> int:
     """Return the number of a limb of the first performer by its name; a number is returned unchanged.
 

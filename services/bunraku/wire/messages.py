@@ -14,10 +14,31 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, ClassVar
 
 import msgpack
-from pydantic import Field, TypeAdapter, ValidationError, WithJsonSchema
+from pydantic import Field, TypeAdapter, ValidationError
 
+from bunraku.motion.placement import Placement
 from bunraku.wire.errors import MalformedMessage
-from bunraku.wire.limbs import MAX_BONDS, MAX_LIMBS, MAX_PERFORMERS, MAX_SHOWN_PULLS
+from bunraku.wire.fields import (
+    ClockTime,
+    CrowdEntries,
+    Duration,
+    Flag,
+    HandPair,
+    LimbEpoch,
+    LimbNumber,
+    LiveEntries,
+    MotionId,
+    MotionTime,
+    Place,
+    PropEntries,
+    PropNumber,
+    PropPlace,
+    PuppeteerEntries,
+    SafeInteger,
+    Text,
+    Tracks,
+)
+from bunraku.wire.limbs import MAX_BONDS, MAX_LIMBS, MAX_SHOWN_PULLS
 from bunraku.wire.live import Live, Sample
 from bunraku.wire.overlay import Overlay
 
@@ -26,101 +47,6 @@ SUBPROTOCOL = "bunraku.v1"
 CLOCK_NAME = "unix"
 MAX_CLIENT_MESSAGE_BYTES = 1_024
 MAX_SERVER_MESSAGE_BYTES = 1 << 20
-
-Text = Annotated[str, Field(strict=True)]
-Flag = Annotated[bool, Field(strict=True)]
-SafeInteger = Annotated[int, Field(strict=True, ge=0, lt=1 << 53)]
-"""A count or a time that a JavaScript number represents exactly."""
-ClockTime = Annotated[SafeInteger, Field(description="Clock time in microseconds.")]
-MotionTime = Annotated[SafeInteger, Field(description="Motion time in microseconds.")]
-Duration = Annotated[SafeInteger, Field(description="Duration in microseconds.")]
-MotionId = Annotated[Text, Field(description="Id of the motion.")]
-LimbNumber = Annotated[
-    int, Field(strict=True, ge=0, lt=MAX_LIMBS, description="Limb l of performer k has number 4 k + l.")
-]
-HandPair = Annotated[
-    list[LimbNumber], Field(min_length=2, max_length=2, description="Numbers of two hands, in any order.")
-]
-LimbEpoch = Annotated[SafeInteger, Field(description="Epoch of the grant.")]
-Tracks = Annotated[
-    list[dict[str, Any]],
-    WithJsonSchema(
-        {
-            "type": "array",
-            "items": {
-                "title": "Track",
-                "type": "object",
-                "properties": {"type": {"type": "string"}},
-                "required": ["type"],
-            },
-            "description": "One map per track (proto/messages.md, 3.2).",
-        }
-    ),
-]
-PuppeteerEntries = Annotated[
-    list[dict[str, Any]],
-    WithJsonSchema(
-        {
-            "type": "array",
-            "items": {
-                "title": "PuppeteerPresence",
-                "type": "object",
-                "properties": {
-                    "id": {"type": "string"},
-                    "name": {"type": "string"},
-                    "colour": {"type": "integer", "minimum": 0, "maximum": 4},
-                },
-                "required": ["id", "name", "colour"],
-            },
-            "description": "Puppeteers in the order of joining.",
-        }
-    ),
-]
-LiveEntries = Annotated[
-    list[dict[str, Any]],
-    WithJsonSchema(
-        {
-            "type": "array",
-            "items": {
-                "title": "LivePresence",
-                "type": "object",
-                "properties": {
-                    "performer": {"type": "integer", "minimum": 0, "maximum": MAX_PERFORMERS - 1},
-                    "id": {"type": "string"},
-                    "name": {"type": "string"},
-                },
-                "required": ["performer", "id", "name"],
-            },
-            "minItems": 1,
-        }
-    ),
-]
-
-
-CrowdEntries = Annotated[
-    list[dict[str, Any]],
-    WithJsonSchema(
-        {
-            "type": "array",
-            "items": {
-                "title": "CrowdPresence",
-                "type": "object",
-                "properties": {
-                    "limb": {"type": "integer", "minimum": 0, "maximum": MAX_LIMBS - 1},
-                    "policy": {"type": "string"},
-                    "pulls": {"type": "integer", "minimum": 0},
-                },
-                "required": ["limb", "policy", "pulls"],
-            },
-            "minItems": 1,
-        }
-    ),
-]
-FiniteNumber = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Place = Annotated[
-    list[FiniteNumber],
-    Field(min_length=3, max_length=3, description="Target of a limb, as the values of an Input of kind 1."),
-]
 
 
 class _MapMessage:
@@ -179,7 +105,7 @@ class Presence(_MapMessage):
 
     `limbs` has an id or None for each limb. `asks` has a list of ids for each limb, in the order of the requests; if it
     is empty it is replaced by an empty list for each limb. `live` is None if no performer is live, `bonds` if no hands
-    are bonded, `crowd` if no limb is open to the crowd.
+    are bonded, `crowd` if no limb is open to the crowd, `props` if the session has none.
     """
 
     TYPE = 6
@@ -199,6 +125,7 @@ class Presence(_MapMessage):
     crowd: Annotated[
         CrowdEntries | None, Field(description="Limbs that are open to the crowd, by number; absent: none.")
     ] = None
+    props: Annotated[PropEntries | None, Field(description="Props of the session, by number; absent: none.")] = None
 
     def __post_init__(self) -> None:
         if not self.asks:
@@ -272,6 +199,15 @@ class CrowdPulls(_MapMessage):
     limb: LimbNumber
     count: Annotated[SafeInteger, Field(description="Number of members who pull.")]
     places: Annotated[list[Place], Field(max_length=MAX_SHOWN_PULLS, description="Targets of some of them.")]
+
+
+@dataclass(frozen=True, slots=True)
+class PropRefusal(_MapMessage):
+    """A prop is not put where this puppeteer wanted it."""
+
+    TYPE = 18
+    prop: PropNumber
+    reason: Annotated[Text, Field(description="A reason of proto/messages.md, 3.7.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,6 +293,22 @@ class Pull(_MapMessage):
     TYPE = 74
     limb: LimbNumber
     place: Place
+
+
+@dataclass(frozen=True, slots=True)
+class Put(_MapMessage):
+    """Request to put a prop into a hand, or to lay it down at a place."""
+
+    TYPE = 75
+    prop: PropNumber
+    limb: LimbNumber | None = None
+    place: PropPlace | None = None
+
+    def __post_init__(self) -> None:
+        if (self.limb is None) == (self.place is None):
+            raise ValueError("expected either limb or place")
+        if self.place is not None:
+            Placement.parse(self.place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -463,16 +415,16 @@ class Input:
 
 
 Message = (
-    ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Notice | BondEnd | CrowdPulls | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Bond | Pull
-    | Input | Sample
+    ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant
+    | Refusal | Notice | BondEnd | CrowdPulls | PropRefusal | Choice | Live | Ping | Edit | Report | Claim | Release
+    | Alive | Ask | Bond | Pull | Put | Input | Sample
 )  # fmt: skip
 
 FIXED_MESSAGES = (Data, Overlay, Live, Ping, Pong, Input, Sample)
 """Messages of fixed layout."""
 MAP_MESSAGES = (
     ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, BondEnd,
-    CrowdPulls, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull,
+    CrowdPulls, PropRefusal, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull, Put,
 )  # fmt: skip
 """Messages that are a MessagePack map."""
 

@@ -21,7 +21,8 @@ from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.performance import FADE_US, HOLD_US
 from bunraku.runtime.clock import clock
 from bunraku.session.live.cast import Cast, CastMember
-from bunraku.session.stage import OVERLAY_LEAD_US, SessionStart, Stage
+from bunraku.session.session_start import SessionStart
+from bunraku.session.stage import OVERLAY_LEAD_US, Stage
 from bunraku.wire.live import Live, Sample
 from bunraku.wire.messages import Claim, Input
 from bunraku.wire.overlay import Overlay

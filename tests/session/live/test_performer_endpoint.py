@@ -23,7 +23,8 @@ from bunraku.session.live.performer_endpoint import (
     REPLACED_LIFETIME_US,
     PerformerEndpoint,
 )
-from bunraku.session.stage import SessionStart, Stage
+from bunraku.session.session_start import SessionStart
+from bunraku.session.stage import Stage
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.storage.motion_store import MotionStore
 from tests.time_limit import HANG_TIMEOUT_S

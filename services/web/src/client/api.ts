@@ -1,7 +1,7 @@
 /** HTTP API for motions and sessions (`proto/http.md`). */
 
 import { pageTranslator } from "../i18n/translator";
-import type { CrowdPresence } from "../wire/messages";
+import type { CrowdPresence, PropPresence } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
 import { ProblemError } from "./problem";
 
@@ -43,9 +43,11 @@ export interface Session {
   limbs: (string | null)[];
   /** Limbs that are open to the crowd. */
   crowd?: CrowdPresence[];
+  /** Props. */
+  props?: PropPresence[];
 }
 
-/** Edit of a session's timeline and of its open limbs; `position` in microseconds. */
+/** Edit of a session's timeline, its open limbs and its props; `position` in microseconds. */
 export interface SessionEdit {
   playing?: boolean;
   position?: number;
@@ -53,6 +55,8 @@ export interface SessionEdit {
   motion?: string;
   /** Policy of each limb to open to the crowd, by name or number of the limb; null closes it. */
   crowd?: Readonly<Record<string, "median" | "trimmed mean" | "turns" | "vote" | null>>;
+  /** Kind of each prop to bring on the stage, by number (0 to 7); null removes it. */
+  props?: Readonly<Record<string, "fan" | "umbrella" | "ball" | "branch" | null>>;
 }
 
 /**

@@ -3,7 +3,7 @@
 import { MAX_HAND_SPEED, MAX_LEG_SPEED } from "../marionette/constants";
 import { LIMBS } from "../motion/skeleton";
 import { isHand, limbNumber, MAX_LIMBS } from "../wire/limbs";
-import type { BondEnd, Grant, Message, Notice, Presence, Refusal } from "../wire/messages";
+import type { BondEnd, Grant, Message, Notice, Presence, PropRefusal, Refusal } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
 import { BondPredictor } from "./bond-predictor";
 import { BondRequests, type LimbPair, orderedPair } from "./bond-requests";
@@ -41,6 +41,7 @@ export interface PuppeteerOptions {
  * - "refusal" (detail `{limb, reason, holder}`): a claim was refused, or a held limb was lost.
  * - "lapsed" (detail `{limb, free}`): a request for the limb ended without a grant; `free` if nobody holds it.
  * - "bondend" (detail `{limbs, reason}`): two hands are not, or no longer, bonded (`proto/messages.md`, 3.7).
+ * - "prop refusal" (detail `{prop, reason}`): a prop is not put where it should be (`proto/messages.md`, 3.7).
  * - "notice" (detail `{limb, reason, detail}`): an input was changed by the session.
  * - "presence": there is a new `presence`.
  * - "closed" (detail: the reason): the connection is lost, or closed for good if `isClosed`.
@@ -128,6 +129,14 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
   /** Return true while there is a request for the limb. */
   isAsking(limb: number): boolean {
     return this.limbHolds[limb].askState !== "none";
+  }
+
+  /**
+   * Put a prop of the session (`presence.props`) into a hand, or lay it down at `place`: x and z in metres, and the turn
+   * about y in radians, stage frame. Return false if not connected.
+   */
+  put(prop: number, limb: number | null, place: readonly number[] | null = null): boolean {
+    return this.connection.send({ name: "Put", prop, limb, place: limb === null ? [...(place ?? [0, 0, 0])] : null });
   }
 
   /** Bonded hands, as last sent by the session. */
@@ -220,6 +229,9 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
       case "BondEnd":
         this.onBondEnd(message);
         break;
+      case "PropRefusal":
+        this.onPropRefusal(message);
+        break;
       case "Notice":
         this.onNotice(message);
         break;
@@ -281,6 +293,10 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     for (const [first, other] of this.bondRequests.takeLost(limb, this.limbHolds, this.now()))
       this.connection.send({ name: "Bond", limbs: [first, other], wanted: true });
     this.dispatchEvent(new CustomEvent("grant", { detail: { limb, asked } }));
+  }
+
+  private onPropRefusal({ prop, reason }: PropRefusal): void {
+    this.dispatchEvent(new CustomEvent("prop refusal", { detail: { prop, reason } }));
   }
 
   private onBondEnd({ limbs, reason }: BondEnd): void {

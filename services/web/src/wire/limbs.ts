@@ -4,6 +4,8 @@ import { LIMBS } from "../motion/skeleton";
 
 /** Performers of a motion, one per track of type `motion`. */
 export const MAX_PERFORMERS = 4;
+/** Props of a session. */
+export const MAX_PROPS = 8;
 export const MAX_LIMBS = LIMBS.length * MAX_PERFORMERS;
 
 /** Returns the number of a performer's limb; `limb` is an index into `LIMBS`. */

@@ -2,12 +2,13 @@
 
 import { decode, encode } from "@msgpack/msgpack";
 import { MalformedMessage } from "./errors";
-import { MAX_LIMBS, MAX_PERFORMERS } from "./limbs";
+import { MAX_LIMBS, MAX_PERFORMERS, MAX_PROPS } from "./limbs";
 import {
   type CrowdPresence,
   type LivePresence,
   MESSAGE_TYPES,
   type Message,
+  type PropPresence,
   type PuppeteerPresence,
   type ServerMessage,
   type Track,
@@ -19,6 +20,8 @@ type FieldParser = (value: unknown) => unknown;
 type FixedMessageName = "Data" | "Overlay" | "Live" | "Ping" | "Pong" | "Input" | "Sample";
 type MapMessageName = Exclude<Message["name"], FixedMessageName>;
 
+/** Furthest place of a prop along x and z (`proto/messages.md`, 3.7). */
+const MAX_STAGE_DISTANCE_M = 100;
 /** Bound on lists and maps: above any valid message, and fast to decode. */
 const MAX_ENTRIES = 100_000;
 
@@ -92,6 +95,27 @@ const openLimb = mapOf(
   }),
 );
 
+const prop: FieldParser = (value) => (
+  count(value), requireValid((value as number) < MAX_PROPS, `a prop, 0..${MAX_PROPS - 1}`), value
+);
+const stagedProp = mapOf(
+  (value): PropPresence => ({
+    prop: prop(value.prop) as number,
+    kind: text(value.kind) as string,
+    limb: optional(limb)(value.limb) as number | null,
+    place: place(value.place) as number[],
+  }),
+);
+
+/** Where a prop is laid; absent, there is a `limb` to hold it. */
+const propPlace = (value: unknown, before: Readonly<Record<string, unknown>>): unknown => {
+  const at = optional(place)(value) as number[] | null;
+  requireValid((at === null) !== (before.limb === null), "either limb or place");
+  const isOnStage = at === null || Math.max(Math.abs(at[0]), Math.abs(at[1])) <= MAX_STAGE_DISTANCE_M;
+  requireValid(isOnStage, `x and z within ${MAX_STAGE_DISTANCE_M} metres`);
+  return at;
+};
+
 /** Requests for each of the `limbs` read before; absent, there are none. */
 const asksPerLimb = (value: unknown, { limbs }: Readonly<Record<string, unknown>>): unknown => {
   const each = limbs as unknown[];
@@ -133,6 +157,7 @@ export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
     live: optional(list(livePerformer)),
     bonds: optional(list(limbPair)),
     crowd: optional(list(openLimb)),
+    props: optional(list(stagedProp)),
   },
   Problem: { title: text, detail: text },
   Welcome: { id: text, colour: count, lead: count },
@@ -141,6 +166,7 @@ export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
   Notice: { limb, reason: text, detail: text },
   BondEnd: { limbs: limbPair, reason: text },
   CrowdPulls: { limb, count, places: list(place) },
+  PropRefusal: { prop, reason: text },
   Choice: { rate: count, reason: text, line: optional(count) },
 };
 
@@ -154,6 +180,7 @@ export const CLIENT_MAP_FIELDS: MapFields<Exclude<MapMessageName, ServerMapName>
   Ask: { limb, wanted: flag },
   Bond: { limbs: limbPair, wanted: flag },
   Pull: { limb, place },
+  Put: { prop, limb: optional(limb), place: propPlace },
 };
 
 /** Encodes a message: the type byte and the map of its fields that are not null. */

@@ -86,6 +86,8 @@ export interface Presence {
   bonds: number[][] | null;
   /** Limbs that are open to the crowd, by number; absent: none. */
   crowd: CrowdPresence[] | null;
+  /** Props of the session, by number; absent: none. */
+  props: PropPresence[] | null;
 }
 
 /** Answer to a Ping: its `sequence` and `sent`, and the clock times of its arrival and of this answer. */
@@ -174,6 +176,15 @@ export interface CrowdPulls {
   count: number;
   /** Targets of some of them. */
   places: number[][];
+}
+
+/** A prop is not put where this puppeteer wanted it. */
+export interface PropRefusal {
+  name: "PropRefusal";
+  /** Number of the prop. */
+  prop: number;
+  /** A reason of proto/messages.md, 3.7. */
+  reason: string;
 }
 
 /** Clock request. It has the size of the answer, so that both directions take equally long to transmit. */
@@ -272,6 +283,17 @@ export interface Pull {
   place: number[];
 }
 
+/** Request to put a prop into a hand, or to lay it down at a place. */
+export interface Put {
+  name: "Put";
+  /** Number of the prop. */
+  prop: number;
+  /** Limb l of performer k has number 4 k + l. */
+  limb: number | null;
+  /** Where it lies: x and z, metres, and turn about y from z towards x, radians; stage frame. */
+  place: number[] | null;
+}
+
 export interface PuppeteerPresence {
   id: string;
   name: string;
@@ -290,6 +312,13 @@ export interface CrowdPresence {
   pulls: number;
 }
 
+export interface PropPresence {
+  prop: number;
+  kind: string;
+  limb: number | null;
+  place: number[];
+}
+
 export type ServerMessage =
   | ChannelHeader
   | Description
@@ -306,9 +335,10 @@ export type ServerMessage =
   | Choice
   | Live
   | BondEnd
-  | CrowdPulls;
+  | CrowdPulls
+  | PropRefusal;
 
-export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond | Pull;
+export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond | Pull | Put;
 
 export type Message = ServerMessage | ClientMessage;
 
@@ -330,6 +360,7 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Live: LIVE_TYPE,
   BondEnd: 16,
   CrowdPulls: 17,
+  PropRefusal: 18,
   Ping: 64,
   Edit: 65,
   Report: 66,
@@ -341,4 +372,5 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Sample: 72,
   Bond: 73,
   Pull: 74,
+  Put: 75,
 };

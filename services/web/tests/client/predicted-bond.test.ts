@@ -81,6 +81,7 @@ class PlayedStage {
       live: null,
       bonds,
       crowd: null,
+      props: null,
       viewers: 2,
       puppeteers: [],
       limbs,

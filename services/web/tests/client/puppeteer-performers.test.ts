@@ -34,7 +34,17 @@ afterEach(() => endControlSession({ viewer, viewerSocket, puppeteer, socket }));
 
 /** Receive who holds each limb, and who asks for it. */
 function receivePresence(limbs: (string | null)[], asks = noAsks(limbs.length)): void {
-  socket.receive({ name: "Presence", live: null, bonds: null, crowd: null, viewers: 2, puppeteers: [], limbs, asks });
+  socket.receive({
+    name: "Presence",
+    live: null,
+    bonds: null,
+    crowd: null,
+    props: null,
+    viewers: 2,
+    puppeteers: [],
+    limbs,
+    asks,
+  });
 }
 
 /** Return the current poses of both performers. */

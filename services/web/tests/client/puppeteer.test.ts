@@ -143,6 +143,7 @@ describe("a bond of two hands", () => {
       live: null,
       bonds,
       crowd: null,
+      props: null,
       viewers: 1,
       puppeteers: [],
       limbs: ["a1", null, null, null],
@@ -219,7 +220,17 @@ describe("a bond of two hands", () => {
 
 describe("request for a limb that another puppeteer holds", () => {
   const presence = (limbs: (string | null)[], asks: string[][]) =>
-    socket.receive({ name: "Presence", live: null, bonds: null, crowd: null, viewers: 2, puppeteers: [], limbs, asks });
+    socket.receive({
+      name: "Presence",
+      live: null,
+      bonds: null,
+      crowd: null,
+      props: null,
+      viewers: 2,
+      puppeteers: [],
+      limbs,
+      asks,
+    });
   const held = ["b2", null, null, null];
   let events: unknown[];
 
@@ -447,6 +458,7 @@ describe("own limb", () => {
       live: null,
       bonds: null,
       crowd: null,
+      props: null,
       viewers: 2,
       puppeteers: [],
       limbs: ["b2", null, null, null],

@@ -69,6 +69,7 @@ describe("start", () => {
       live: null,
       bonds: null,
       crowd: null,
+      props: null,
       viewers: 1,
       puppeteers: [],
       limbs: [null, null, null, null],

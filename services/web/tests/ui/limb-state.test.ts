@@ -14,6 +14,7 @@ test("holders and requesters of limbs have names and colours", () => {
     live: null,
     bonds: null,
     crowd: null,
+    props: null,
     viewers: 2,
     puppeteers: [
       { id: "a", name: "Aiko", colour: 0 },

@@ -74,6 +74,7 @@ test("asks has one list per limb, for any number of performers", () => {
     live: null,
     bonds: null,
     crowd: null,
+    props: null,
     viewers: 1,
     puppeteers: [],
     limbs: Array.from({ length: limbs }, () => null),
@@ -107,6 +108,7 @@ test("live performer has a number of 0..3, an id and a name", () => {
       live: [entry],
       bonds: null,
       crowd: null,
+      props: null,
     }) as unknown as Message;
   const valid = presence({ performer: 3, id: "p", name: "Aiko" });
   expect(unpack(pack(valid))).toEqual(valid);
