@@ -382,6 +382,11 @@ export class Engine {
           ? (stage?.cameraRecorder.movedKeyframes(clock - viewer.duration * 1e6) ?? [])
           : [];
       }
+      case "put prop": {
+        const { putProp } = await import("./prop-request");
+        const playback = this.#playback;
+        return playback && putProp(playback, stage?.performers ?? [], request.prop, request.limb);
+      }
     }
   }
 
