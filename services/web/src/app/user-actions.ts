@@ -21,6 +21,7 @@ import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
 import { createEditedMotion } from "./motion-edit";
 import type { PlaybackController } from "./playback-controller";
+import { createPropActions, type PropContext } from "./prop-actions";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
@@ -100,6 +101,7 @@ export function createUserActions(app: AppParts): UserActions {
           edits: createEditActions(app),
         }
       : {}),
+    ...(pageAccess.allows("control") ? { props: createPropActions(() => propContext(app)) } : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
           add: (motion) => {
@@ -175,6 +177,15 @@ function createEditActions(app: AppParts): EditActions {
     edit: (motion, edit) =>
       createEditedMotion(motion, edit, app.page.library, (made) => app.playback.playUploadedMotion(made.id)),
     position: ({ id }) => (app.library.currentItem?.id === id ? (app.playback.current?.position ?? null) : null),
+  };
+}
+
+function propContext({ page, playback, stageHost }: AppParts): PropContext {
+  const { current } = playback;
+  return {
+    toast: page.toast,
+    current: current?.kind === "sessions" ? current : null,
+    putProp: (prop, limb) => stageHost.putProp(prop, limb),
   };
 }
 
