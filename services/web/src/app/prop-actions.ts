@@ -53,9 +53,9 @@ function describeRefusal(
 ): string {
   const text = REFUSAL_TEXTS[refusal];
   if (text) return translate(text);
-  if (limb === null) return translate("Someone else holds the hand with this prop");
-  const name = limbName(limb, performerCount);
+  const name = limb === null ? "" : limbName(limb, performerCount);
   if (refusal === "full") return translate("The {limb} has another prop", { limb: name });
-  const holder = limbHolders(presence, puppeteerId, performerCount)[limb];
-  return translate("{name} holds the {limb}", { name: holder?.name ?? translate("Someone"), limb: name });
+  const holder = limb === null ? null : limbHolders(presence, puppeteerId, performerCount)[limb];
+  if (holder && !holder.mine) return translate("{name} holds the {limb}", { name: holder.name, limb: name });
+  return translate("Someone else holds the hand with this prop");
 }
