@@ -64,6 +64,7 @@ export function createPropSection(actions: PropActions, { translate } = pageTran
     element("div", { class: "prop-adders", role: "group", "aria-label": translate("Add a prop") }, ...adders),
     full,
   );
+  section.addEventListener("toggle", () => section.open && section.scrollIntoView({ block: "nearest" }));
   const removeRow = (prop: number, row: PropRow) => {
     const hadFocus = row.element.contains(document.activeElement);
     row.element.remove();
