@@ -19,6 +19,7 @@ from bunraku.codec.container import (
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.extension.contact import ContactTrack, encode_contacts
 from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.props import PropTrack, encode_props
 from bunraku.codec.extension.track import ExtensionTrack
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
@@ -27,6 +28,7 @@ from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
 from bunraku.motion.analysis import analyse
 from bunraku.motion.placement import Placement
+from bunraku.motion.prop import PropState
 from bunraku.wire.messages import Data, Description, unpack
 from tests.motion.extended_source import extended_source
 from tests.vectors.audio import random_packets
@@ -234,3 +236,13 @@ def test_extensions_without_a_track_number_are_left_out() -> None:
     packed, types = replace_scene_tracks("b", stored, [CAMERA] * (MAX_TRACKS - 1), {"camera"})
     assert len(types) == MAX_TRACKS
     assert extended_performers(unpack_motion("b", packed)) == []
+
+
+def test_props_come_last_and_count_limbs_from_their_performers() -> None:
+    props = encode_props(["fan", "ball"], [[PropState(1)] * 60, [None] * 60], EXTENDED.track)
+    stored = unpack_motion("a", pack_motion("a", EXTENDED, extensions=[props, EXTENSION]))
+    assert [getattr(track, "part", None) for track in stored.tracks] == [None, "body", "props"]
+    assert stored.tracks[2] == props.track
+    joined, _ = add_performers("b", stored, [stored], [Placement(), Placement()])
+    tracks = [track for track in unpack_motion("b", joined).tracks if isinstance(track, PropTrack)]
+    assert [(track.performer, track.kinds) for track in tracks] == [(0, ("fan", "ball")), (1, ("fan", "ball"))]

@@ -19,6 +19,7 @@ CONTRACT = [
     "bunraku.codec.audio",
     "bunraku.codec.coefficients",
     "bunraku.codec.extension.contact",
+    "bunraku.codec.extension.props",
     "bunraku.codec.skeleton_description",
     "bunraku.codec.motion_decoder",
     "bunraku.codec.integer_coder",

@@ -22,6 +22,7 @@ from bunraku.codec.extension.body_joints import unpack_body
 from bunraku.codec.extension.contact import decode_contact_block, pack_contact_block
 from bunraku.codec.extension.face_axes import unpack_face
 from bunraku.codec.extension.finger_joints import unpack_fingers
+from bunraku.codec.extension.props import decode_prop_block, pack_prop_block
 from bunraku.codec.extension.track import Extension, ExtensionTrack, decode_extension_block
 from bunraku.codec.motion_decoder import MotionBlock, decode_motion_block
 from bunraku.codec.motion_track import MOTION_CODEC, MotionTrack, parse_motion_track
@@ -30,6 +31,7 @@ from bunraku.codec.skeleton_description import MAX_SKELETON_BYTES, SkeletonDescr
 from bunraku.motion.extension import BodyExtension, extend_pose
 from bunraku.motion.face import MAX_GAZE_RAD, Face, face_expressions
 from bunraku.motion.hands import WRISTS, Hands, pose_hands
+from bunraku.motion.prop import MAX_PROPS
 from bunraku.motion.rotation import IDENTITY, Array
 from bunraku.motion.skeleton import JOINT_COUNT, world_transforms
 from bunraku.wire.errors import MalformedMessage
@@ -208,7 +210,27 @@ def contacts(data: bytes) -> bool:
     return True
 
 
-TARGETS: tuple[Callable[[bytes], bool], ...] = (block, skeleton_description, message, audio, extension, contacts)
+def prop(data: bytes) -> bool:
+    """Decode a block of props. The first byte is their number, the next two the number of frames."""
+    count = 1 + (data[0] if data else 0) % MAX_PROPS
+    frames = min(int.from_bytes(data[1:3].ljust(2, b"\0"), "little") + 1, MAX_BLOCK_FRAMES)
+    try:
+        decoded = decode_prop_block(data[3:], count, frames)
+    except DamagedBlock:
+        return False
+    assert len(pack_prop_block(decoded.states)) <= len(data[3:])
+    return True
+
+
+TARGETS: tuple[Callable[[bytes], bool], ...] = (
+    block,
+    skeleton_description,
+    message,
+    audio,
+    extension,
+    contacts,
+    prop,
+)
 
 
 def _largest_block() -> bytes:
@@ -245,4 +267,10 @@ def load_seeds() -> list[tuple[int, bytes]]:
     for vector in [*planted["valid"], *planted["invalid"]]:
         frames = len(vector["left"]) if "left" in vector else planted["tracks"][0]["block_frames"]
         seeds.append((5, (frames - 1).to_bytes(2, "little") + base64.b64decode(vector["block"])))
+    staged = load_golden("props.json")
+    for vector in [*staged["valid"], *staged["invalid"]]:
+        track = staged["tracks"][vector.get("track", 0)]
+        frames = vector.get("frames", track["block_frames"])
+        head = bytes([len(track["kinds"]) - 1]) + (frames - 1).to_bytes(2, "little")
+        seeds.append((6, head + base64.b64decode(vector["block"])))
     return seeds

@@ -58,8 +58,9 @@ HOSTILE_DESCRIPTIONS = st.builds(
         (2, HOSTILE_DESCRIPTIONS),
         (3, golden_inputs(3)),
         (5, golden_inputs(5)),
+        (6, golden_inputs(6)),
     ],
-    ids=["blocks", "dancers", "messages", "descriptions", "audio", "contacts"],
+    ids=["blocks", "dancers", "messages", "descriptions", "audio", "contacts", "props"],
 )
 def test_random_input_is_accepted_or_rejected_as_declared(
     number: int, inputs: st.SearchStrategy[bytes], tally: Callable[[str], None], request: pytest.FixtureRequest

@@ -5,14 +5,16 @@ import pytest
 
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.extension.contact import encode_contacts
+from bunraku.codec.extension.props import encode_props
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
 from bunraku.motion import rotation
+from bunraku.motion.prop import PropState
 from bunraku.motion.skeleton import joint_and_tip_positions
-from bunraku.playout.block_store import ContactBlockStore, MotionBlockStore, SceneBlockStore
+from bunraku.playout.block_store import ContactBlockStore, MotionBlockStore, PropBlockStore, SceneBlockStore
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera
 
@@ -155,6 +157,22 @@ def test_contacts_are_those_of_the_frame_that_began() -> None:
             found = store.contacts_at(position)
             assert found is not None
             np.testing.assert_array_equal(found, planted[frame])
+    with pytest.raises(DamagedBlock):
+        store.put_encoded(0, 0, b"")
+    with pytest.raises(ValueError, match="does not belong"):
+        store.put_encoded(99, 0, encoded.ladder[0].blocks[0])
+
+
+def test_props_are_those_of_the_frame_that_began() -> None:
+    states = [PropState(frame % 2) if frame % 5 else None for frame in range(120)]
+    encoded = encode_props(["fan"], [states], ENCODED.track)
+    store = PropBlockStore(encoded.track)
+    assert store.states_at(0) is None
+    for index, block in enumerate(encoded.ladder[0].blocks):
+        assert store.put_encoded(index, 0, block)
+    for frame in range(120):
+        for position in (round(frame * 1e6 / 30), round((frame + 0.9) * 1e6 / 30)):
+            assert store.states_at(position) == (states[frame],)
     with pytest.raises(DamagedBlock):
         store.put_encoded(0, 0, b"")
     with pytest.raises(ValueError, match="does not belong"):

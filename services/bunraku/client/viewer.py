@@ -17,6 +17,7 @@ from bunraku.client.viewer_statistics import ViewerStatistics
 from bunraku.codec import motion_decoder
 from bunraku.codec.audio import AudioPacket, AudioTrack
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension.props import shift_limb
 from bunraku.codec.extension.track import Extension, ExtensionPart, decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
@@ -27,11 +28,20 @@ from bunraku.delivery.resume import MAX_BLOCKS, HeldBlocks, ResumeState
 from bunraku.motion.extension import BodyExtension, ExtendedPose, extend_pose
 from bunraku.motion.face import EXPRESSION_INDEX, Face, face_expressions
 from bunraku.motion.hands import Hands
+from bunraku.motion.placement import Placement
+from bunraku.motion.prop import Prop, PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import world_transforms
 from bunraku.playout import timeline
 from bunraku.playout.audio_store import AudioBlockStore
-from bunraku.playout.block_store import ContactBlockStore, ExtensionBlockStore, MotionBlockStore, Pose, SceneBlockStore
+from bunraku.playout.block_store import (
+    ContactBlockStore,
+    ExtensionBlockStore,
+    MotionBlockStore,
+    Pose,
+    PropBlockStore,
+    SceneBlockStore,
+)
 from bunraku.playout.clock import ReferenceClock
 from bunraku.playout.delay import PlayoutDelay
 from bunraku.playout.live_buffer import LiveBuffer
@@ -263,6 +273,19 @@ class Viewer:
         contacts = store.contacts_at(timeline.position_at(state, reference))
         return None if contacts is None else (bool(contacts[0]), bool(contacts[1]))
 
+    def props_at(self, reference: int) -> list[Prop]:
+        """Return the props of the session, in the order of their numbers, then those of the motion at `reference`."""
+        entries = (self.presence.props if self.presence is not None else None) or []
+        props = [Prop(entry["kind"], PropState(entry["limb"], Placement.parse(entry["place"]))) for entry in entries]
+        state, tracks = self.timeline_history.at(reference), self._tracks
+        if state is None or tracks is None or state.motion != self.motion:
+            return props
+        for store in tracks.props.values():
+            shown = store.states_at(timeline.position_at(state, reference)) or ()
+            states = (shift_limb(each, store.track.performer) for each in shown)
+            props += [Prop(kind, each) for kind, each in zip(store.track.kinds, states, strict=False) if each]
+        return props
+
     def _extension_values(self, reference: int, performer: int, part: ExtensionPart) -> tuple[Extension, Array] | None:
         """Return an extension and its values at `reference`; None if there is none, or a block is missing."""
         state, tracks = self.timeline_history.at(reference), self._tracks
@@ -397,7 +420,7 @@ class Viewer:
                 self.statistics.light_blocks += 1
         elif isinstance(store, ExtensionBlockStore):
             store.put(data.index, data.rate, decode_extension_block(store.track, data.block))
-        elif isinstance(store, ContactBlockStore):
+        elif isinstance(store, ContactBlockStore | PropBlockStore):
             store.put_encoded(data.index, data.rate, data.block)
         elif isinstance(store, AudioBlockStore):
             store.put_encoded(data.index, data.rate, data.block)

@@ -15,6 +15,7 @@ import msgpack
 from bunraku.codec.audio import AudioTrack, EncodedAudio, parse_audio_track
 from bunraku.codec.extension.contact import ContactTrack, EncodedContacts, parse_contact_track
 from bunraku.codec.extension.encoder import EncodedExtension
+from bunraku.codec.extension.props import EncodedProps, PropTrack, parse_prop_track
 from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, ExtensionTrack, parse_extension_track
 from bunraku.codec.motion_encoder import BitrateLevel, EncodedMotion
 from bunraku.codec.motion_track import MotionTrack, parse_motion_track
@@ -27,7 +28,7 @@ from bunraku.wire.messages import Data, Description
 MAX_TRACKS = 16
 """Limit of the tracks of a motion: a Data message has four bits for the track."""
 
-Track = MotionTrack | SceneTrack | AudioTrack | ExtensionTrack | ContactTrack
+Track = MotionTrack | SceneTrack | AudioTrack | ExtensionTrack | ContactTrack | PropTrack
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +112,7 @@ def pack_motion(
     encoded: EncodedMotion,
     scenes: Sequence[EncodedScene] = (),
     others: Sequence[EncodedMotion] = (),
-    extensions: Sequence[EncodedExtension | EncodedContacts] = (),
+    extensions: Sequence[EncodedExtension | EncodedContacts | EncodedProps] = (),
     audio: EncodedAudio | None = None,
 ) -> bytes:
     """Return the object of a motion: performers (`encoded`, then `others`), cameras and lights, audio, extensions.
@@ -235,8 +236,11 @@ def _parse_other_track(description: dict[str, Any], first_track: MotionTrack) ->
     if description["type"] == "audio":
         return parse_audio_track(description, first_track)
     if description["type"] == EXTENSION_TYPE:
-        is_contacts = description.get("part") == ExtensionPart.CONTACTS
-        return parse_contact_track(description) if is_contacts else parse_extension_track(description)
+        if description.get("part") == ExtensionPart.CONTACTS:
+            return parse_contact_track(description)
+        if description.get("part") == ExtensionPart.PROPS:
+            return parse_prop_track(description)
+        return parse_extension_track(description)
     return parse_scene_track(description)
 
 

@@ -7,6 +7,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from bunraku.codec.extension.contact import ContactBlock, ContactTrack, decode_contact_block
+from bunraku.codec.extension.props import PropBlock, PropTrack, ShownState, decode_prop_block
 from bunraku.codec.extension.track import ExtensionBlock, ExtensionTrack
 from bunraku.codec.motion_decoder import MotionBlock
 from bunraku.codec.motion_track import MotionTrack
@@ -85,6 +86,15 @@ class TrackBlockStore(Generic[Track, Block]):
         if instant <= block.frames - 1 or following not in self._blocks:
             return block, min(max(instant, -0.5), block.frames - 0.5), None
         return block, instant, self._blocks[following][1]
+
+    def _find_frame(self, position: int) -> tuple[Block, int] | None:
+        """Return the block at motion time `position`, and the frame in it that began last; None if it is missing."""
+        index = self.track.block_at(position)
+        if index not in self._blocks:
+            return None
+        block = self._blocks[index][1]
+        frame = int((position + 1) * self.track.fps / 1e6) - self.track.first_frame(index)
+        return block, min(max(frame, 0), block.frames - 1)
 
 
 class MotionBlockStore(TrackBlockStore[MotionTrack, MotionBlock]):
@@ -194,10 +204,27 @@ class ContactBlockStore(TrackBlockStore[ContactTrack, ContactBlock]):
 
         A frame lasts until the next one. Returns None if the block is missing.
         """
-        found = self._find_block(position, loop=False)
+        found = self._find_frame(position)
         if found is None:
             return None
-        first = self.track.first_frame(self.track.block_at(position))
-        frame = int((position + 1) * self.track.fps / 1e6) - first
-        planted: BoolArray = found[0].planted[min(max(frame, 0), found[0].frames - 1)]
+        block, frame = found
+        planted: BoolArray = block.planted[frame]
         return planted
+
+
+class PropBlockStore(TrackBlockStore[PropTrack, PropBlock]):
+    """Decoded blocks of the props of a motion."""
+
+    def put_encoded(self, index: int, level: int, data: bytes) -> bool:
+        """Decode and store a block; return True if it was stored. Raises ValueError or `DamagedBlock`."""
+        if not 0 <= index < self.track.block_count:
+            raise ValueError(f"Block {index} does not belong to this track of {self.track.block_count} blocks")
+        return self.put(index, level, decode_prop_block(data, len(self.track.kinds), self.track.frames_in(index)))
+
+    def states_at(self, position: int) -> tuple[ShownState, ...] | None:
+        """Return the state of each prop at motion time `position`, in microseconds; limbs are those of the track.
+
+        A frame lasts until the next one. Returns None if the block is missing.
+        """
+        found = self._find_frame(position)
+        return None if found is None else tuple(states[found[1]] for states in found[0].states)

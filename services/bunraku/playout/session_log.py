@@ -137,6 +137,8 @@ class SessionLog:
                 log.timelines.append(state)
             log._chunks.append(_Chunk(0, 1 << 63, bytearray(values["overlays"])))
             for clock, props in values.get("props", []):
+                if not isinstance(clock, int):
+                    raise CorruptSessionLog("session log rejected: the time of a change of props is not an integer")
                 log.add_props(clock, {number: Prop.from_values(prop) for number, prop in props})
         except (ValueError, KeyError, TypeError, msgpack.UnpackException) as error:
             raise CorruptSessionLog(f"session log rejected: {error}") from error

@@ -9,15 +9,24 @@ from typing import Any
 from bunraku.codec.audio import parse_audio_track
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.extension.contact import parse_contact_track
+from bunraku.codec.extension.props import parse_prop_track
 from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, parse_extension_track
 from bunraku.codec.motion_track import parse_motion_track
 from bunraku.codec.scene import parse_scene_track
 from bunraku.motion.placement import STAGE_CENTRE, Placement
 from bunraku.playout.audio_store import AudioBlockStore
-from bunraku.playout.block_store import ContactBlockStore, ExtensionBlockStore, MotionBlockStore, SceneBlockStore
+from bunraku.playout.block_store import (
+    ContactBlockStore,
+    ExtensionBlockStore,
+    MotionBlockStore,
+    PropBlockStore,
+    SceneBlockStore,
+)
 from bunraku.wire.limbs import MAX_PERFORMERS
 
-AnyBlockStore = MotionBlockStore | SceneBlockStore | AudioBlockStore | ExtensionBlockStore | ContactBlockStore
+AnyBlockStore = (
+    MotionBlockStore | SceneBlockStore | AudioBlockStore | ExtensionBlockStore | ContactBlockStore | PropBlockStore
+)
 
 
 class TrackSet:
@@ -46,6 +55,8 @@ class TrackSet:
         """Extensions by index and part of the performer."""
         self.contacts: dict[int, ContactBlockStore] = {}
         """Contacts of the feet by index of the performer."""
+        self.props: dict[int, PropBlockStore] = {}
+        """Props of the motion by index of the performer whose limbs come first."""
         self.audio: AudioBlockStore | None = None
         """Store of the first audio track that can be played, if any."""
         self.described_count = 0
@@ -72,6 +83,9 @@ class TrackSet:
                 elif track.get("type") == EXTENSION_TYPE and track.get("part") == ExtensionPart.CONTACTS:
                     contacts = ContactBlockStore(parse_contact_track(track))
                     self._stores[number] = self.contacts.setdefault(contacts.track.performer, contacts)
+                elif track.get("type") == EXTENSION_TYPE and track.get("part") == ExtensionPart.PROPS:
+                    props = PropBlockStore(parse_prop_track(track))
+                    self._stores[number] = self.props.setdefault(props.track.performer, props)
                 elif track.get("type") == EXTENSION_TYPE:
                     extension = ExtensionBlockStore(parse_extension_track(track))
                     key = extension.track.performer, extension.track.part

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from bunraku.codec.audio import AudioTrack
 from bunraku.codec.container import StoredMotion, Track
 from bunraku.codec.extension.contact import ContactTrack
+from bunraku.codec.extension.props import PropTrack
 from bunraku.codec.extension.track import ExtensionTrack
 from bunraku.codec.motion_track import MotionTrack
 from bunraku.codec.scene import SCENE_CHANNEL_COUNT, SceneTrack
@@ -95,11 +96,13 @@ def _count_track_channels(track: Track) -> int:
         return len(track.layout.axes)
     if isinstance(track, ContactTrack):
         return len(FEET)
+    if isinstance(track, PropTrack):
+        return len(track.kinds)
     return SCENE_CHANNEL_COUNT if isinstance(track, SceneTrack) else CHANNEL_COUNT
 
 
 def _track_type(track: Track) -> str:
     """Return the type of a track, of an extension its part."""
-    if isinstance(track, ExtensionTrack | ContactTrack):
+    if isinstance(track, ExtensionTrack | ContactTrack | PropTrack):
         return track.part.value
     return "motion" if isinstance(track, MotionTrack) else track.kind

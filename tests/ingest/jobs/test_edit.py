@@ -10,6 +10,7 @@ from bunraku.codec.audio import AudioTrack, unpack_audio_block
 from bunraku.codec.container import PerformerTracks, StoredMotion, pack_motion, unpack_motion
 from bunraku.codec.extension.contact import ContactTrack, decode_contact_block
 from bunraku.codec.extension.encoder import encode_extension
+from bunraku.codec.extension.props import PropTrack, decode_prop_block, encode_props
 from bunraku.codec.extension.track import Extension, ExtensionTrack, decode_extension_block
 from bunraku.codec.motion_encoder import ERROR_BOUNDS_MM, encode_motion
 from bunraku.codec.scene import SceneSamples, SceneTrack
@@ -22,6 +23,7 @@ from bunraku.motion.analysis import analyse
 from bunraku.motion.extension import BodyExtension
 from bunraku.motion.mirror import OPPOSITE_JOINTS, mirror_body, mirror_face, mirror_hands
 from bunraku.motion.placement import Placement
+from bunraku.motion.prop import PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, TIP_JOINTS, joint_and_tip_positions
 from bunraku.wire.messages import Data
@@ -277,3 +279,20 @@ def test_part_has_the_contacts_of_its_own_feet(mirror: bool) -> None:
     assert standing.all()
     assert not lifted[14:36].any()
     assert lifted[:8].all()
+
+
+@pytest.mark.parametrize("mirror", [False, True])
+def test_part_has_its_props(mirror: bool) -> None:
+    encoded = encode_motion(stepping_motion(90), error_bounds_mm=(5.0,), grade="live")
+    laid = PropState(None, Placement(0.5, 1.0, 0.25))
+    props = encode_props(["fan"], [[None] * 30 + [PropState(1)] * 30 + [laid] * 30], encoded.track)
+    edited, result = edit(unpack_motion("x", pack_motion("x", encoded, extensions=[props])), 20, 80, mirror)
+    assert result.description["tracks"] == ["motion", "extension", "extension"]
+    track = edited.tracks[2]
+    assert isinstance(track, PropTrack)
+    blocks = [
+        decode_prop_block(data, 1, track.frames_in(index)).states[0] for index, data in enumerate(edited.blocks(2)[0])
+    ]
+    mirrored = PropState(None, Placement(-0.5, 1.0, -0.25))
+    expected = [None] * 10 + [PropState(1 - mirror)] * 30 + [mirrored if mirror else laid] * 20
+    assert [state for block in blocks for state in block] == expected

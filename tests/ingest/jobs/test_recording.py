@@ -11,12 +11,14 @@ from bunraku.codec.motion_encoder import encode_motion
 from bunraku.codec.scene import SceneTrack
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.ingest.jobs.recording import encode_recording, sample_camera
-from bunraku.ingest.jobs.replay import SessionReplay, extensions_of
+from bunraku.ingest.jobs.replay import SessionReplay, extensions_of, props_of
 from bunraku.ingest.result import JobRejection, JobResult
 from bunraku.marionette.marionettes import Marionettes
 from bunraku.marionette.ownership import LimbInput
 from bunraku.messaging.recording_request import RecordingRequest, pack_camera
 from bunraku.motion.analysis import analyse
+from bunraku.motion.placement import Placement
+from bunraku.motion.prop import Prop, PropState
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore, SceneBlockStore
@@ -248,3 +250,37 @@ def test_recording_has_the_contacts_of_what_was_shown() -> None:
     track = container.unpack_motion("recorded", result.packed).tracks[1]
     assert isinstance(track, ContactTrack)
     assert (track.frames, track.fps) == (120, 60.0)
+
+
+def test_recording_has_the_props_that_were_on_the_stage() -> None:
+    log = SessionLog()
+    log.add_timeline(timeline.start("one", 3 * SECOND_US, START_CLOCK_US))
+    laid = Prop("fan", PropState(None, Placement(0.5, 1.0, 0.25)))
+    held, ball = Prop("fan", PropState(1)), Prop("ball", PropState(9))
+    log.add_props(START_CLOCK_US - SECOND_US, {2: laid})
+    log.add_props(START_CLOCK_US + SECOND_US, {2: held, 5: ball})
+    log.add_props(START_CLOCK_US + SECOND_US * 3 // 2, {5: ball})
+    request = RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + 2 * SECOND_US)
+    result = encode_recording("recorded", request, log.pack(), MOTIONS)
+    motion, _ = unpack_recording(result)
+    (props,) = props_of(motion)
+    assert props.track.kinds == ("fan", "ball")
+    played = timeline.start("recorded", 2 * SECOND_US, START_CLOCK_US)
+    seen = [props.states_at(played, START_CLOCK_US + round(frame * 1e6 / 60)) for frame in range(120)]
+    # a hand of a performer who is not on the stage holds nothing
+    dropped = ball.state._replace(limb=None)
+    assert seen == [[laid.state, None]] * 60 + [[PropState(1), dropped]] * 30 + [[None, dropped]] * 30
+    again = SessionLog()
+    again.add_timeline(timeline.start("recorded", 2 * SECOND_US, START_CLOCK_US))
+    again.add_props(START_CLOCK_US, {number: Prop("branch") for number in range(7)})
+    result = encode_recording("again", request, again.pack(), {"recorded": motion})
+    (props,) = props_of(unpack_recording(result)[0])
+    assert props.track.kinds == (*["branch"] * 7, "fan")
+    assert props.states_at(timeline.start("again", 2 * SECOND_US, START_CLOCK_US), START_CLOCK_US)[7] == laid.state
+
+
+def test_recording_without_props_has_no_track_of_them() -> None:
+    request = RecordingRequest(log="l", begin=START_CLOCK_US, end=START_CLOCK_US + SECOND_US)
+    one = timeline.start("one", 3 * SECOND_US, START_CLOCK_US)
+    motion, _ = unpack_recording(encode_recording("recorded", request, make_log(one), MOTIONS))
+    assert props_of(motion) == []

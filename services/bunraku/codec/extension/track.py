@@ -31,12 +31,13 @@ _NO_OFFSETS: IntArray = np.zeros(0, dtype=np.int64)
 
 
 class ExtensionPart(StrEnum):
-    """Part of a performer that an extension adds. Contacts have a track of their own (`contact`)."""
+    """Part of a performer that an extension adds. Contacts and props have tracks of their own (`contact`, `props`)."""
 
     BODY = "body"
     FINGERS = "fingers"
     FACE = "face"
     CONTACTS = "contacts"
+    PROPS = "props"
 
 
 class _Format(NamedTuple):

@@ -16,6 +16,7 @@ from bunraku.codec.audio import SAMPLE_RATE, AudioTrack, EncodedAudio, cut_audio
 from bunraku.codec.container import PerformerTracks, StoredMotion, pack_motion
 from bunraku.codec.extension.contact import EncodedContacts
 from bunraku.codec.extension.encoder import EncodedExtension, encode_extension
+from bunraku.codec.extension.props import EncodedProps, PropTrack, ShownState, decode_prop_block, encode_props
 from bunraku.codec.extension.track import Extension, ExtensionTrack, decode_extension_block
 from bunraku.codec.motion_decoder import decode_motion_block
 from bunraku.codec.motion_encoder import EncodedMotion
@@ -43,6 +44,7 @@ from bunraku.motion.mirror import (
     mirror_placement,
     mirror_vectors,
 )
+from bunraku.motion.prop import PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.seamless_loop import BLEND_S, close_loop, close_value_loop
 from bunraku.motion.skeleton import Motion
@@ -73,7 +75,7 @@ def edit_motion(
         for performer, each in zip(stored.performers, encode_motions(motions, on_progress), strict=True)
     ]
     scenes: list[EncodedScene] = []
-    extensions: list[EncodedExtension | EncodedContacts] = []
+    extensions: list[EncodedExtension | EncodedContacts | EncodedProps] = []
     audio: EncodedAudio | None = None
     for number, track in enumerate(stored.tracks):
         if isinstance(track, SceneTrack):
@@ -85,6 +87,11 @@ def edit_motion(
             motion = encoded[track.performer]
             errors_mm = [level.mean_error_mm for level in motion.ladder]
             extensions.append(encode_extension(extension, values, motion.track, errors_mm, track.performer))
+        elif isinstance(track, PropTrack):
+            states = cut_props(track, stored.blocks(number)[0], start_s, duration_s)
+            if mirror:
+                states = [[_mirror_prop(state) for state in each] for each in states]
+            extensions.append(encode_props(track.kinds, states, encoded[track.performer].track, track.performer))
         elif isinstance(track, AudioTrack):
             audio = cut_audio(track, stored.blocks(number), encoded[0].track, round(start_s * SAMPLE_RATE))
     extensions += encode_foot_contacts(motions, encoded)
@@ -125,6 +132,25 @@ def cut_extension(track: ExtensionTrack, blocks: list[bytes], start_s: float, du
         ]
     )
     return close_value_loop(values, earlier, earlier + count, track.fps) if loop else values
+
+
+def cut_props(track: PropTrack, blocks: list[bytes], start_s: float, duration_s: float) -> list[list[ShownState]]:
+    """Return the states of a part of the props, `states[prop][frame]`."""
+    instants, _, _ = _instants_of(track, start_s, duration_s, loop=False)
+    states: list[list[ShownState]] = [[] for _ in track.kinds]
+    for index, within in _split_into_blocks(track, instants):
+        block = decode_prop_block(blocks[index], len(track.kinds), track.frames_in(index))
+        frames = np.clip(np.floor(within + 1e-6), 0, block.frames - 1).astype(int)
+        for each, shown in zip(states, block.states, strict=True):
+            each += [shown[frame] for frame in frames]
+    return states
+
+
+def _mirror_prop(state: ShownState) -> ShownState:
+    if state is None:
+        return None
+    # the hands of a performer have numbers 4 k and 4 k + 1
+    return PropState(None if state.limb is None else state.limb ^ 1, mirror_placement(state.place))
 
 
 def _mirror_extension(extension: Extension, values: Array) -> tuple[Extension, Array]:

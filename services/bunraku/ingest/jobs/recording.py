@@ -10,16 +10,20 @@ import numpy as np
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.extension.contact import EncodedContacts
 from bunraku.codec.extension.encoder import EncodedExtension, encode_extension
+from bunraku.codec.extension.props import EncodedProps, ShownState, encode_props
 from bunraku.codec.motion_encoder import EncodedMotion
 from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_encoder import encode_scene
+from bunraku.codec.timing import Timing
 from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encode_foot_contacts, encode_motions
-from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay, extensions_of
+from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay, extensions_of, props_of
 from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
+from bunraku.motion.prop import MAX_PROPS, PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion
 from bunraku.playout.session_log import CorruptSessionLog, SessionLog
+from bunraku.wire.limbs import LIMBS
 
 
 def encode_recording(
@@ -65,9 +69,10 @@ def encode_recording(
         replace(each, front=performer.front, placement=performer.placement)
         for performer, each in zip(played.performers, encode_motions(recorded, on_progress), strict=True)
     ]
-    extensions: list[EncodedExtension | EncodedContacts] = [
+    extensions: list[EncodedExtension | EncodedContacts | EncodedProps] = [
         *_record_extensions(session, played, times, [encoded, *others]),
         *encode_foot_contacts(recorded, [encoded, *others]),
+        *_record_props(session, played, times, encoded.track),
     ]
     return JobResult(
         pack_motion(motion_id, encoded, scenes, others, extensions),
@@ -100,6 +105,38 @@ def _record_extensions(
         values = np.stack(shown)
         encoded.append(encode_extension(extension.track.extension, values, motion.track, mean_errors_mm, performer))
     return encoded
+
+
+def _record_props(
+    session: SessionReplay, played: StoredMotion, times: Sequence[int], timing: Timing
+) -> list[EncodedProps]:
+    """Encode the props of the session, and those of the played motion as far as there is room for them."""
+    limb_count = len(LIMBS) * len(played.performers)
+    own: dict[tuple[int, str], list[ShownState]] = {}
+    stored: dict[tuple[int, int], list[ShownState]] = {}
+    tracks = props_of(played)
+    for frame, time in enumerate(times):
+        state = session.timeline_at(time)
+        assert state is not None
+        for number, prop in session.session_props_at(time).items():
+            # another kind of the same number is another prop
+            own.setdefault((number, prop.kind), _new_states(times))[frame] = _as_shown(prop.state, limb_count)
+        for index, track in enumerate(tracks):
+            for number, shown in enumerate(track.states_at(state, time)):
+                stored.setdefault((index, number), _new_states(times))[frame] = shown
+    kinds = [kind for _, kind in own] + [tracks[index].track.kinds[number] for index, number in stored]
+    if not kinds:
+        return []
+    return [encode_props(kinds[:MAX_PROPS], [*own.values(), *stored.values()][:MAX_PROPS], timing)]
+
+
+def _new_states(times: Sequence[int]) -> list[ShownState]:
+    return [None] * len(times)
+
+
+def _as_shown(state: PropState, limb_count: int) -> PropState:
+    """Return the state of a prop; one in a hand that is not on the stage lies where it lay before."""
+    return state if state.limb is None or state.limb < limb_count else state._replace(limb=None)
 
 
 def sample_camera(keys: Array, times: Sequence[int]) -> SceneSamples:

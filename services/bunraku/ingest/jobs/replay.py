@@ -8,11 +8,13 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from bunraku.codec.container import PerformerTracks, StoredMotion
 from bunraku.codec.errors import DamagedBlock
+from bunraku.codec.extension.props import PropTrack, ShownState, shift_limb
 from bunraku.codec.extension.track import ExtensionTrack, decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
+from bunraku.motion.prop import Prop
 from bunraku.motion.rotation import Array
-from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, Pose
+from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, Pose, PropBlockStore
 from bunraku.playout.live_buffer import LiveBuffer
 from bunraku.playout.overlay_buffer import OVERLAY_HOLD_US, OverlayBuffer
 from bunraku.playout.session_log import SessionLog
@@ -45,6 +47,10 @@ class SessionReplay:
         """Return the timeline at a clock time, None before the first."""
         index = bisect_right(self._clocks, clock)
         return self._states[index - 1] if index else None
+
+    def session_props_at(self, clock: int) -> dict[int, Prop]:
+        """Return the props of the session at a clock time, by number."""
+        return self._log.props_at(clock)
 
     def motion_poses_at(self, clock: int) -> list[Pose] | None:
         """Return each performer's live pose, or else its pose in the stored motion.
@@ -127,6 +133,34 @@ def extensions_of(motion: StoredMotion) -> list[ExtensionPlayback]:
         ExtensionPlayback(track, packets[-1])
         for track, packets in zip(motion.tracks, motion.packets, strict=True)
         if isinstance(track, ExtensionTrack)
+    ]
+
+
+class PropPlayback:
+    """Props of a motion, decoded on demand. Limbs are those of the stage."""
+
+    def __init__(self, track: PropTrack, packets: Sequence[bytes]) -> None:
+        self.track, self._packets = track, packets
+        self._store = PropBlockStore(track)
+
+    def states_at(self, state: TimelineState, clock: int) -> list[ShownState]:
+        """Return the state of each prop that a timeline shows at a clock time."""
+        position = position_at(state, clock)
+        index = self.track.block_at(position)
+        if self._store.level(index) < 0:
+            packet = Data.unpack(self._packets[index])
+            self._store.put_encoded(index, packet.rate, packet.block)
+        states = self._store.states_at(position)
+        assert states is not None, "every block is stored"
+        return [shift_limb(shown, self.track.performer) for shown in states]
+
+
+def props_of(motion: StoredMotion) -> list[PropPlayback]:
+    """Return the tracks of props of a motion."""
+    return [
+        PropPlayback(track, packets[-1])
+        for track, packets in zip(motion.tracks, motion.packets, strict=True)
+        if isinstance(track, PropTrack)
     ]
 
 

@@ -1,7 +1,7 @@
 /** Performers of the current motion, and the playback statistics of the first one. */
 
 import type { StagedPose } from "../motion/extension";
-import { CONTACT_PART, markControlledLegs } from "../motion/foot-contact";
+import { markControlledLegs } from "../motion/foot-contact";
 import type { Figure } from "../motion/skeleton";
 import type { ExtensionPoses } from "../playout/extension-poses";
 import type { LivePoses } from "../playout/live-poses";
@@ -9,12 +9,14 @@ import { OverlayBuffer } from "../playout/overlay-buffer";
 import { positionAt } from "../playout/timeline";
 import type { TrackSet } from "../playout/track-set";
 import type { Live } from "../wire/live";
-import type { Data, TimelineState } from "../wire/messages";
+import type { Data, PropPresence, TimelineState } from "../wire/messages";
 import { type LimbPredictor, PerformerView } from "./performer-view";
 import type { SolverLoader } from "./solver-loader";
 
 /** Time after which loading the decoder of live poses is attempted again, milliseconds. */
 const LIVE_RETRY_DELAY_MS = 2_000;
+/** Parts whose tracks have states of frames, not values. */
+const PARTS_WITHOUT_VALUES: readonly string[] = ["contacts", "props"];
 /** Blocks of extensions that are kept until their code is loaded. */
 const MAX_EARLY_BLOCKS = 256;
 
@@ -139,9 +141,14 @@ export class PerformerViewSet {
     return pose;
   }
 
-  /** Load the missing code of extensions. That of contacts alone waits for the first pose, which they do not change. */
+  /** Return the props of the motion at presented clock time `clock`. */
+  propsAt(timeline: TimelineState, clock: number): readonly PropPresence[] {
+    return this.extensions?.propsAt(positionAt(timeline, clock)) ?? [];
+  }
+
+  /** Load the missing code of extensions. That of contacts and props waits for the first pose, which they do not change. */
   private requestExtensions(extensions: TrackSet["extensions"]): void {
-    const hasValues = [...extensions.values()].some(({ part }) => part !== CONTACT_PART);
+    const hasValues = [...extensions.values()].some(({ part }) => !PARTS_WITHOUT_VALUES.includes(String(part)));
     const isComplete = this.extensions && (this.extensions.openExtension || !hasValues);
     const isWanted = hasValues || (extensions.size > 0 && this.firstPoseMs !== null);
     if (isWanted && !isComplete) void this.loadExtensions(hasValues);

@@ -15,7 +15,16 @@ import { type LeaderTime, PresentationClock } from "../playout/presentation-cloc
 import { positionAt, TimelineHistory } from "../playout/timeline";
 import { TrackSet } from "../playout/track-set";
 import type { Live } from "../wire/live";
-import type { CrowdPulls, Data, Description, Edit, Message, Presence, TimelineState } from "../wire/messages";
+import type {
+  CrowdPulls,
+  Data,
+  Description,
+  Edit,
+  Message,
+  Presence,
+  PropPresence,
+  TimelineState,
+} from "../wire/messages";
 import { OVERLAY_FRAME_INTERVAL_US, type Overlay } from "../wire/overlay";
 import { pageAccess } from "./access";
 import type { LimbPredictor } from "./performer-view";
@@ -72,7 +81,7 @@ export class Viewer extends EventTarget {
     super();
     this.url = new URL(options.url);
     this.url.searchParams.set("extensions", "true");
-    this.url.searchParams.set("parts", "body,fingers,face,contacts");
+    this.url.searchParams.set("parts", "body,fingers,face,contacts,props");
     this.now = options.now ?? (() => performance.now());
     const { access = pageAccess, solver = marionetteSolverFactory(access) } = options;
     const origin = this.url.origin.replace(/^ws/, "http");
@@ -220,6 +229,17 @@ export class Viewer extends EventTarget {
   /** Return the states of all lights whose first block was received. */
   lightsAt(nowMs: number): LightState[] {
     return lightStates(this.scenes, (scene) => this.sceneAt(nowMs, scene));
+  }
+
+  /**
+   * Return the props on the stage at local `nowMs`: those of the session, then those of the motion, whose numbers are 8
+   * and above (`proto/playback.md`, 4.12).
+   */
+  propsAt(nowMs: number): readonly PropPresence[] {
+    const clock = this.presentationTime(nowMs);
+    const timeline = this.timelineHistory.at(clock);
+    const stored = timeline && timeline.motion === this.motion ? this.performerViews.propsAt(timeline, clock) : [];
+    return [...(this.presence?.props ?? []), ...stored];
   }
 
   /** Show the limbs of `puppeteer` without the delay of the session. */

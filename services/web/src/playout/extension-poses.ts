@@ -1,15 +1,18 @@
 /**
- * What extensions add to the poses of a motion's performers. The module is loaded when a motion has extensions; that of
- * their values only if it has more than contacts of feet.
+ * What extensions add to the poses of a motion's performers, and to the stage. The module is loaded when a motion has
+ * extensions; that of their values only if it has more than contacts of feet and props.
  */
 
 import { DamagedBlock } from "../codec/errors";
 import { ContactTrack } from "../codec/extension/contact";
+import { PROP_PART, PropTrack } from "../codec/extension/props";
 import type { StagedPose } from "../motion/extension";
 import { CONTACT_PART, type FootContacts } from "../motion/foot-contact";
 import type { Figure } from "../motion/skeleton";
-import type { Data, Track } from "../wire/messages";
+import { MAX_PROPS } from "../wire/limbs";
+import type { Data, PropPresence, Track } from "../wire/messages";
 import { ContactBlockStore } from "./contact-store";
+import { PropBlockStore } from "./prop-store";
 
 /** Position in a motion, with the motion's duration and the presented clock time, in microseconds. */
 export interface MotionInstant {
@@ -64,6 +67,7 @@ export class PerformerExtensions {
 export class ExtensionPoses {
   private readonly opened = new Map<number, OpenedExtension>();
   private readonly performers = new Map<number, PerformerExtensions>();
+  private readonly props: PropBlockStore[] = [];
 
   /** @param openExtension opens tracks of values; null leaves them out until it is set and they are added again */
   constructor(public openExtension: ((description: Track) => OpenedExtension) | null = null) {}
@@ -71,7 +75,7 @@ export class ExtensionPoses {
   /** Add the extension tracks, by their index in the Description, that were not added yet. */
   add(tracks: ReadonlyMap<number, Track>): void {
     for (const [index, description] of tracks) {
-      const open = description.part === CONTACT_PART ? openContacts : this.openExtension;
+      const open = this.openerOf(description);
       if (!open || this.opened.has(index)) continue;
       try {
         const extension = open(description);
@@ -86,6 +90,11 @@ export class ExtensionPoses {
     }
   }
 
+  /** Return the props of the motion at a motion time (microseconds), with numbers after those of a session. */
+  propsAt(position: number): PropPresence[] {
+    return this.props.flatMap((store, index) => store.propsAt(position, MAX_PROPS * (1 + index)));
+  }
+
   /** Store a block. Return false if it cannot be decoded or does not belong to its track. */
   put({ track, index, rate, block }: Data): boolean {
     try {
@@ -95,6 +104,17 @@ export class ExtensionPoses {
       if (!(error instanceof DamagedBlock)) throw error;
       return false;
     }
+  }
+
+  private openerOf({ part }: Track): ((description: Track) => OpenedExtension) | null {
+    if (part === CONTACT_PART) return openContacts;
+    return part === PROP_PART ? (description) => this.openProps(description) : this.openExtension;
+  }
+
+  private openProps(description: Track): OpenedExtension {
+    const store = new PropBlockStore(PropTrack.fromDescription(description));
+    this.props.push(store);
+    return { store, part: PROP_PART, performer: store.track.performer, write: () => undefined };
   }
 
   /** Return the extensions of a performer, or null if it has none. */

@@ -218,6 +218,21 @@ describe("a bond of two hands", () => {
   });
 });
 
+describe("props", () => {
+  test("are put into a hand and laid down, and refusals have a reason", () => {
+    const refusals: unknown[] = [];
+    puppeteer.addEventListener("prop refusal", (event) => refusals.push((event as CustomEvent).detail));
+    expect(puppeteer.put(2, 5)).toBe(true);
+    puppeteer.put(2, null, [0.5, -1, 2]);
+    expect(socket.messagesOf("Put")).toEqual([
+      { name: "Put", prop: 2, limb: 5, place: null },
+      { name: "Put", prop: 2, limb: null, place: [0.5, -1, 2] },
+    ]);
+    socket.receive({ name: "PropRefusal", prop: 2, reason: "held" });
+    expect(refusals).toEqual([{ prop: 2, reason: "held" }]);
+  });
+});
+
 describe("request for a limb that another puppeteer holds", () => {
   const presence = (limbs: (string | null)[], asks: string[][]) =>
     socket.receive({

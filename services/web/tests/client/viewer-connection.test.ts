@@ -58,7 +58,7 @@ describe("lost connection", () => {
     advanceTime(250);
     const clock = EPOCH_US + 650_000;
     expect(FakeWebSocket.last.url).toBe(
-      `ws://stage/v1/motions/dance/stream?rate=1&extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts&have=dance.0.1--.2&at=0.700000&clock=${clock}`,
+      `ws://stage/v1/motions/dance/stream?rate=1&extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts%2Cprops&have=dance.0.1--.2&at=0.700000&clock=${clock}`,
     );
     FakeWebSocket.last.accept();
     FakeWebSocket.last.receive(header(), description(), timeline({ position: 700_000 }));

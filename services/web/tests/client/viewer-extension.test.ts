@@ -6,6 +6,7 @@ import type { Message } from "../../src/wire/messages";
 import { contactVectors } from "../golden-contacts";
 import { extensionVectors, goldenDescription as goldenExtension } from "../golden-extensions";
 import { type BlockVectors, goldenDescription } from "../golden-motion";
+import { propVectors } from "../golden-props";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 import { FakeWebSocket } from "./fake-websocket";
 
@@ -104,6 +105,16 @@ test("a pose has the contacts of its feet, without those of a controlled leg", a
   const limbs = new Map([[2, new Int16Array(9)]]);
   FakeWebSocket.last.receive({ name: "Overlay", sequence: 0, due: EPOCH_US, limbs, earlier: [] });
   expect(viewer.poseAt(0)?.contacts).toEqual({ planted: 2, controlled: 1, clock: EPOCH_US });
+});
+
+test("props of the motion are on the stage once their code is loaded", async () => {
+  const props = propVectors();
+  const { track, index, block } = props.valid[0];
+  start(description(props.tracks[track] as ReturnType<typeof extension>), data(0, motionBlock));
+  FakeWebSocket.last.receive({ name: "Data", track: 1, rate: 0, index, block: decodeBase64(block) });
+  expect(viewer.poseAt(0)).not.toBeNull();
+  const held = { prop: 9, kind: "later", limb: 13, place: [0, 0, 0] };
+  await vi.waitFor(() => expect(viewer.propsAt(0)).toEqual([held]));
 });
 
 test("contacts of a motion without their track are not known", async () => {

@@ -46,6 +46,27 @@ describe("crowd", () => {
   });
 });
 
+describe("props", () => {
+  test("are those of the session before those of the motion", () => {
+    createViewer();
+    expect(viewer.propsAt(0)).toEqual([]);
+    FakeWebSocket.last.accept();
+    const props = [{ prop: 3, kind: "fan", limb: 1, place: [0.5, 1, 0.25] }];
+    FakeWebSocket.last.receive({
+      name: "Presence",
+      viewers: 1,
+      puppeteers: [],
+      limbs: [null, null, null, null],
+      asks: [[], [], [], []],
+      live: null,
+      bonds: null,
+      crowd: null,
+      props,
+    });
+    expect(viewer.propsAt(0)).toEqual(props);
+  });
+});
+
 describe("start", () => {
   test("state is empty before the first message", () => {
     createViewer();

@@ -7,6 +7,7 @@ import type { Data, Track } from "../../src/wire/messages";
 import { contactVectors } from "../golden-contacts";
 import { extensionVectors, goldenDescription } from "../golden-extensions";
 import { goldenHandsFaceDescription, handsFaceVectors } from "../golden-hands-face";
+import { propVectors } from "../golden-props";
 import { decodeBase64 } from "../golden-vectors";
 
 const golden = extensionVectors();
@@ -129,5 +130,22 @@ describe("contacts", () => {
     const poses = new ExtensionPoses(openExtension);
     poses.add(new Map([[1, { ...contacts.tracks[0], codec: "bunraku.contact/9" }]]));
     expect(poses.performer(0)).toBeNull();
+  });
+});
+
+describe("props", () => {
+  const props = propVectors();
+
+  test("are those of all tracks at the motion time, with numbers of their own", () => {
+    const poses = new ExtensionPoses(null);
+    expect(poses.propsAt(0)).toEqual([]);
+    poses.add(new Map(props.tracks.map((track, n) => [n, track])));
+    expect(poses.propsAt(0)).toEqual([]);
+    for (const { track, index, block: data } of props.valid)
+      expect(poses.put({ name: "Data", track, rate: 0, index, block: decodeBase64(data) })).toBe(true);
+    const staged = poses.propsAt(500_000);
+    expect(staged.map(({ prop }) => prop)).toEqual([8, 9, 16, 24, 25, 26, 27, 28, 29, 30, 31]);
+    expect(staged[2]).toEqual({ prop: 16, kind: "ball", limb: 4, place: [0, 0, 0] });
+    expect(poses.put({ name: "Data", track: 0, rate: 1, index: 1, block: new Uint8Array(1) })).toBe(false);
   });
 });
