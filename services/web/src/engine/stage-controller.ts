@@ -201,7 +201,7 @@ export class StageController {
       limbs,
       strings,
       lights: viewer?.lightsAt(now) ?? [],
-      props: viewer?.presence?.props ?? [],
+      props: viewer?.propsAt(now) ?? [],
       seconds,
     };
   }

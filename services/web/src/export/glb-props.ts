@@ -1,6 +1,7 @@
 /** Props of a GLB file: meshes that move with the hands of the puppets, or lie on the floor. */
 
-import { PropMovement, type PropState } from "../motion/prop-movement";
+import type { PropState } from "../codec/extension/props";
+import { PropMovement } from "../motion/prop-movement";
 import {
   createPropTransform,
   GRIP_SHARE,

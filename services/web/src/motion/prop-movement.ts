@@ -6,26 +6,25 @@ import { combine } from "./vector";
 /** Time in which a prop moves to another place, in seconds. */
 const DURATION_S = 0.25;
 
-/** Where a prop is: in a hand, or at a place [x, z, turn] of the floor. */
-export interface PropState {
-  readonly limb: number | null;
-  readonly place: readonly number[];
-}
-
 export class PropMovement {
   /** Transform of the last call of `moveTo`. */
   readonly transform = createPropTransform();
   readonly #start = createPropTransform();
-  /** State of the last call; null before the first and while the prop is not seen. */
+  /** Hand or place of the last call; null before the first and while the prop is not seen. */
   #state: string | null = null;
   /** Share of the movement that is left. */
   #left = 0;
 
   /**
-   * Move towards a transform, which is that of a prop in this state and may itself move, and return where the prop is
-   * `seconds` after the last call. Infinity moves it at once, as does the first call.
+   * Move towards a transform, which is that of a prop in the hand `limb`, or else at this place of the floor, and may
+   * itself move. Return where the prop is `seconds` after the last call. Infinity moves it at once, as does the first
+   * call.
    */
-  moveTo(target: PropTransform, { limb, place }: PropState, seconds: number): PropTransform {
+  moveTo(
+    target: PropTransform,
+    { limb, place }: { readonly limb: number | null; readonly place: readonly number[] },
+    seconds: number,
+  ): PropTransform {
     const { position, rotation } = this.transform;
     const state = limb === null ? place.join() : `limb ${limb}`;
     if (this.#state !== null && state !== this.#state) {

@@ -1,10 +1,10 @@
 import { AnimationMixer, type Matrix4, type Mesh, Quaternion, Vector3 } from "three";
 import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { describe, expect, test } from "vitest";
+import type { PropState } from "../../src/codec/extension/props";
 import { writeGlb } from "../../src/export/glb";
 import type { SampledProp } from "../../src/export/glb-props";
 import type { SampledMotion } from "../../src/export/sampled-motion";
-import type { PropState } from "../../src/motion/prop-movement";
 import { PROP_RESTS } from "../../src/motion/props";
 import { JOINTS, TIP_JOINTS } from "../../src/motion/skeleton";
 import { createPropShape } from "../../src/stage/props/prop-shape";

@@ -77,7 +77,7 @@ export class PropGroup {
     for (const prop of props) {
       const { kind } = prop;
       if (!isPropKind(kind)) continue;
-      const key = keyOf(prop, shown);
+      const key = `${prop.prop} ${kind}`;
       shown.add(key);
       const drawn = this.#props.get(key) ?? this.#add(key, kind);
       const place = transformOf(prop, kind, performers, floorHeight);
@@ -162,14 +162,6 @@ export class PropGroup {
     this.#geometries.set(kind, geometry);
     return geometry;
   }
-}
-
-/** Return a name of a prop that stays the same while it is on the stage and differs from those that are `used`. */
-function keyOf({ prop, kind }: PropPresence, used: ReadonlySet<string>): string {
-  let key = `${prop} ${kind}`;
-  // A recorded prop may have the number of one of the session's.
-  while (used.has(key)) key += "'";
-  return key;
 }
 
 /** Return where a prop belongs, null if its performer is not seen. The next call reuses the storage. */
