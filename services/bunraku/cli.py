@@ -27,6 +27,7 @@ from bunraku.cli_capture import capture
 from bunraku.cli_crowd import crowd
 from bunraku.cli_inspect import inspect
 from bunraku.cli_library import edit, list_motions, reencode, rename, tag
+from bunraku.cli_props import props
 from bunraku.cli_send import send
 from bunraku.runtime.display_text import escape_text
 from bunraku.terminal import (
@@ -57,6 +58,7 @@ app = typer.Typer(
 app.command()(token)
 app.command()(share)
 app.command()(crowd)
+app.command()(props)
 app.command()(inspect)
 app.command(name="list")(list_motions)
 app.command()(rename)

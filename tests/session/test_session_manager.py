@@ -16,7 +16,7 @@ from bunraku.runtime.settings import Settings
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_manager import SessionManager
 from bunraku.session.stage_proxy import StageProxy
-from bunraku.wire.messages import Claim, Grant, Presence, TimelineState, Welcome, unpack
+from bunraku.wire.messages import Claim, Grant, Presence, Put, TimelineState, Welcome, unpack
 from bunraku.wire.overlay import Overlay
 from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.time_limit import HANG_TIMEOUT_S
@@ -130,7 +130,11 @@ async def test_replica_takes_over_sessions_of_a_dead_replica(context: ServiceCon
     dead, surviving = replicas
     opened = await dead.sessions.open_session("one")
     stage = surviving.sessions.stage_proxy(opened["id"])
-    before = await stage.edit(SessionEdit(motion="two", position=100_000, playing=False))
+    fittings = {"crowd": {"left_leg": "median"}, "props": {"2": "fan"}}
+    before = await stage.edit(
+        SessionEdit.model_validate({"motion": "two", "position": 100_000, "playing": False, **fittings})
+    )
+    assert before["props"][0]["kind"] == "fan"
     ben = await join_session(context, stage, "Ben")
     stage.send(ben, Claim(0).pack())
     assert received(ben, Grant)
@@ -159,11 +163,16 @@ async def test_closing_replica_hands_over_its_sessions_at_once(context: ServiceC
     ending, staying = (Replica(context, ReplicaTiming(heartbeat_s=0.1, timeout_s=1000.0)) for _ in range(2))
     opened = await ending.sessions.open_session("one")
     published = SessionMessages(context, opened["id"])
-    ben = await join_session(context, staying.sessions.stage_proxy(opened["id"]), "Ben")
+    stage = staying.sessions.stage_proxy(opened["id"])
+    await stage.edit(SessionEdit.model_validate({"props": {"2": "fan"}}))
+    ben = await join_session(context, stage, "Ben")
+    stage.send(ben, Put(2, limb=1).pack())
+    assert (await stage.describe())["props"][0]["limb"] == 1
     await ending.close()
     assert ben.is_unknown
     await published.wait_for(TimelineState)
-    assert (await staying.sessions.stage_proxy(opened["id"]).describe())["motion"] == "one"
+    after = await stage.describe()
+    assert (after["motion"], after["props"][0]["limb"]) == ("one", 1)
     assert ending.sessions.counters.sessions["handed on",] == staying.sessions.counters.sessions["taken over",] == 1
     await staying.close()
 

@@ -6,7 +6,7 @@ import { FrameBlockStore } from "../../src/playout/frame-store";
 class ByteStore extends FrameBlockStore<Timing, { readonly frames: number; readonly values: Uint8Array }> {
   valueAt(position: number): number | null {
     const found = this.findFrame(position);
-    return found && found.block.values[found.frame];
+    return found?.block.values[found.frame] ?? null;
   }
 
   protected override decode(values: Uint8Array) {
