@@ -14,13 +14,22 @@ export interface PropContext {
   readonly toast: ShowToast;
   readonly current: RemotePlayback | null;
   putProp(prop: number, limb: number | null): Promise<PropRefusalReason | null>;
+  moveProp(): Promise<{ readonly limb: number | null; readonly refusal: PropRefusalReason | null }>;
 }
 
 /** Texts for refusals that do not depend on the hand. */
 const REFUSAL_TEXTS: Partial<Record<PropRefusalReason, PlainMessageKey>> = {
+  "none near": "Bring a hand that you hold near a prop",
   unknown: "This prop is no longer on the stage",
   "no answer": "Not connected. Try again when the connection is back",
 };
+
+/** Put the nearest prop into a held hand, or lay down the one that is in it. */
+export async function moveNearestProp({ current, moveProp, toast }: PropContext): Promise<void> {
+  if (!current) return;
+  const { limb, refusal } = await moveProp().catch(() => ({ limb: null, refusal: "no answer" as const }));
+  if (refusal) toast(describeRefusal(refusal, limb, current));
+}
 
 /** Return the actions; `context` is read at each of them. */
 export function createPropActions(context: () => PropContext): PropActions {

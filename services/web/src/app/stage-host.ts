@@ -2,7 +2,7 @@
 import { AvatarError } from "../avatar/error";
 import type { CameraKeyframe } from "../client/api";
 import type { ClaimState } from "../engine/claim-controller";
-import type { EngineEvent, EngineSettings } from "../engine/message";
+import type { EngineEvent, EngineResults, EngineSettings } from "../engine/message";
 import type { PropRefusalReason } from "../engine/prop-request";
 import { translate } from "../i18n/translator";
 import { createGamepadInput } from "../input/gamepad";
@@ -129,6 +129,11 @@ export class StageHost {
   /** Put a prop into a hand, or lay it down (null). Return null once it is there, or the reason why it stays. */
   putProp(prop: number, limb: number | null): Promise<PropRefusalReason | null> {
     return this.options.engine.request({ kind: "put prop", prop, limb });
+  }
+
+  /** Put the nearest prop into a hand that this page holds, or lay down the one that is in it. */
+  moveProp(): Promise<EngineResults["move prop"]> {
+    return this.options.engine.request({ kind: "move prop" });
   }
 
   /** Avatars on the stage. */

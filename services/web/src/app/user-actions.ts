@@ -21,7 +21,7 @@ import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
 import { createEditedMotion } from "./motion-edit";
 import type { PlaybackController } from "./playback-controller";
-import { createPropActions, type PropContext } from "./prop-actions";
+import { createPropActions, moveNearestProp, type PropContext } from "./prop-actions";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
@@ -123,6 +123,9 @@ export function createKeyActions(app: AppParts): PageActions {
     ask: () => app.limbs.act("ask"),
     give: () => app.limbs.act("give"),
     join: () => app.limbs.act("join"),
+    prop: () => {
+      if (pageAccess.allows("control")) void moveNearestProp(propContext(app));
+    },
     play: () => app.playback.togglePlaying(),
     back: () => app.playback.current?.seekByBlocks(-1, performance.now()),
     forward: () => app.playback.current?.seekByBlocks(1, performance.now()),
@@ -186,6 +189,7 @@ function propContext({ page, playback, stageHost }: AppParts): PropContext {
     toast: page.toast,
     current: current?.kind === "sessions" ? current : null,
     putProp: (prop, limb) => stageHost.putProp(prop, limb),
+    moveProp: () => stageHost.moveProp(),
   };
 }
 

@@ -387,6 +387,11 @@ export class Engine {
         const playback = this.#playback;
         return playback && putProp(playback, stage?.performers ?? [], request.prop, request.limb);
       }
+      case "move prop": {
+        const { moveNearestProp } = await import("./prop-request");
+        const { hands, stage: { performers } = { performers: [] } } = this.#controller ?? {};
+        return moveNearestProp(this.#playback, performers, (limb) => Boolean(hands?.source(limb)));
+      }
     }
   }
 

@@ -120,7 +120,9 @@ export type EngineRequest =
   | { kind: "picture" }
   | { kind: "load avatar"; performer: number; file: File }
   | { kind: "camera keyframes" }
-  | { kind: "put prop"; prop: number; limb: number | null };
+  | { kind: "put prop"; prop: number; limb: number | null }
+  /** Put the nearest prop into a hand that this page holds, or lay down the one that is in it. */
+  | { kind: "move prop" };
 
 /** Results of the requests, by their kind. */
 export interface EngineResults {
@@ -131,6 +133,7 @@ export interface EngineResults {
   "camera keyframes": CameraKeyframe[];
   /** Null once the prop is there, or the reason why it stays. */
   "put prop": PropRefusalReason | null;
+  "move prop": { readonly limb: number | null; readonly refusal: PropRefusalReason | null };
 }
 
 /** Failure of a request. */

@@ -1,16 +1,20 @@
 /** Request of the page to put a prop into a hand or to lay it down. Loaded with the first one. */
-import { Vector3 } from "three";
+import { Matrix4, Vector3 } from "three";
+import { GRIP_SHARE } from "../motion/props";
 import type { Performer } from "../stage/puppet/performer";
-import { performerOfLimb } from "../wire/limbs";
+import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
+import type { PropPresence } from "../wire/messages";
 import type { Playback } from "./playback";
 
-/** Reason for which a prop stays where it is: that of the session, or none came. */
-export type PropRefusalReason = "held" | "full" | "unknown" | "leg" | "no answer";
+/** Reason for which a prop stays where it is: that of the session, or none came, or there was no prop to move. */
+export type PropRefusalReason = "held" | "full" | "unknown" | "leg" | "no answer" | "none near";
 
 /** Time after which an unanswered request counts as refused. */
 const ANSWER_TIMEOUT_MS = 5_000;
 /** Distance in front of a performer at which a prop is laid down, in metres. */
 const LAYING_DISTANCE_M = 0.5;
+/** Distance over the floor, or from hand to hand, within which a held hand takes a prop, in metres. */
+const REACH_M = 0.4;
 
 type PropPlace = [x: number, z: number, turn: number];
 
@@ -51,6 +55,34 @@ export function putProp(
     const place = limb === null && performer ? placeBefore(performer) : null;
     if (!puppeteer.put(prop, limb, place)) finish("no answer");
   });
+}
+
+/**
+ * Lay down the prop that is in a hand for which `isHeld` is true, or put the nearest one into such a hand. Return the
+ * hand, null if there is none, and the reason if the prop stays where it is.
+ */
+export async function moveNearestProp(
+  playback: Playback | null,
+  performers: readonly Pick<Performer, "root" | "hand">[],
+  isHeld: (limb: number) => boolean,
+): Promise<{ limb: number | null; refusal: PropRefusalReason | null }> {
+  const props = playback?.viewer.presence?.props ?? [];
+  const hands = performers.flatMap((_, performer) => [0, 1].map((hand) => limbNumber(performer, hand))).filter(isHeld);
+  const own = props.find(({ limb }) => limb !== null && hands.includes(limb));
+  if (playback && own) return { limb: own.limb, refusal: await putProp(playback, performers, own.prop, null) };
+  const gripOf = (limb: number) => {
+    const grip = performers[performerOfLimb(limb)]?.hand(limbWithinPerformer(limb), GRIP_SHARE, new Matrix4());
+    return grip && new Vector3().setFromMatrixPosition(grip);
+  };
+  const distance = ({ limb, place: [x, z] }: PropPresence, hand: number) => {
+    const at = gripOf(hand) as Vector3;
+    return (limb === null ? new Vector3(x, at.y, z) : gripOf(limb))?.distanceTo(at) ?? Infinity;
+  };
+  const [nearest] = props
+    .flatMap((prop) => hands.map((hand) => ({ prop: prop.prop, hand, distance: distance(prop, hand) })))
+    .sort((a, b) => a.distance - b.distance);
+  if (!playback || !nearest || nearest.distance > REACH_M) return { limb: null, refusal: "none near" };
+  return { limb: nearest.hand, refusal: await putProp(playback, performers, nearest.prop, nearest.hand) };
 }
 
 /** Return the place in front of a performer, turned like it. */

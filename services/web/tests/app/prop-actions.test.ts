@@ -1,5 +1,5 @@
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { createPropActions } from "../../src/app/prop-actions";
+import { createPropActions, moveNearestProp, type PropContext } from "../../src/app/prop-actions";
 import { RemotePlayback } from "../../src/app/remote-playback";
 import type { PropRefusalReason } from "../../src/engine/prop-request";
 import type { Presence, PropPresence } from "../../src/wire/messages";
@@ -24,14 +24,16 @@ beforeEach(() => {
 });
 afterEach(() => void vi.unstubAllGlobals());
 
-const actions = createPropActions(() => ({
+const context = (): PropContext => ({
   toast: (message) => void toasts.push(message),
   current: playback,
   putProp: (prop, limb) => {
     puts.push([prop, limb]);
     return answer();
   },
-}));
+  moveProp: async () => ({ limb: 4, refusal: await answer() }),
+});
+const actions = createPropActions(context);
 
 /** Set the presence: numbers of props, and the holder of the second performer's left hand. */
 function show(numbers: number[], holder: string | null = null): void {
@@ -99,6 +101,20 @@ test.each([
   answer = () => Promise.resolve(reason);
   await actions.put(0, limb);
   expect(toasts).toEqual([text]);
+});
+
+test("the key says what keeps a prop where it is, and is without effect on a motion", async () => {
+  await moveNearestProp(context());
+  answer = () => Promise.resolve("none near");
+  await moveNearestProp(context());
+  answer = () => Promise.reject(new Error("no engine"));
+  await moveNearestProp(context());
+  playback = null;
+  await moveNearestProp(context());
+  expect(toasts).toEqual([
+    "Bring a hand that you hold near a prop",
+    "Not connected. Try again when the connection is back",
+  ]);
 });
 
 test("a failed engine is like no connection", async () => {

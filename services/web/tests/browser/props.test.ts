@@ -12,6 +12,7 @@ import {
   waitForFirstPose,
   waitForHold,
   waitForPerformers,
+  waitForRelease,
   waitForToast,
   waitForWelcome,
 } from "./page-probe";
@@ -84,6 +85,18 @@ describeInBrowser("props", { server: "open" }, (fixture) => {
     await expect.poll(() => choice.inputValue()).toBe(String(LEFT_HAND_OF_SECOND));
 
     const late = await open("Late");
+    await waitForHand(late, LEFT_HAND_OF_SECOND);
+
+    // The key takes a near prop from a hand that nobody holds, and lays it down.
+    await waitForToast(mateo, "Bring a hand that you hold near a prop", () => mateo.keyboard.press("KeyF"));
+    await mateo.keyboard.press("KeyT");
+    await tapKey(mateo, "Digit2");
+    await waitForHold(mateo, LEFT_HAND_OF_SECOND);
+    await mateo.keyboard.press("KeyF");
+    for (const page of [aiko, mateo, late]) await waitInEngine(page, isBeforeSecond);
+    await mateo.keyboard.press("Escape");
+    await waitForRelease(mateo, LEFT_HAND_OF_SECOND);
+    await choice.selectOption("Left hand of dancer 2");
     await waitForHand(late, LEFT_HAND_OF_SECOND);
 
     await choice.selectOption("On the floor");

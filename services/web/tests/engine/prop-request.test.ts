@@ -1,7 +1,7 @@
 import { Matrix4, Quaternion, Vector3 } from "three";
-import { beforeEach, expect, test, vi } from "vitest";
+import { beforeEach, describe, expect, test, vi } from "vitest";
 import type { Playback } from "../../src/engine/playback";
-import { placeBefore, putProp } from "../../src/engine/prop-request";
+import { moveNearestProp, placeBefore, putProp } from "../../src/engine/prop-request";
 import type { PropPresence } from "../../src/wire/messages";
 
 class FakeViewer extends EventTarget {
@@ -109,6 +109,50 @@ test("a request that nothing answers expires", async () => {
   } finally {
     vi.useRealTimers();
   }
+});
+
+describe("the prop nearest to a held hand", () => {
+  /** Performers whose hands are half a metre to their sides. */
+  const handed = PERFORMERS.map(({ root }) => ({
+    root,
+    hand: (limb: number, _: number, out: Matrix4) =>
+      out.setPosition(new Vector3().setFromMatrixPosition(root).add(new Vector3(limb === 0 ? 0.5 : -0.5, 0, 0))),
+  }));
+
+  const move = (...held: number[]) =>
+    moveNearestProp({ viewer, puppeteer } as unknown as Playback, handed, (limb) => held.includes(limb));
+  const lying = (prop: number, x: number, z: number): PropPresence => ({
+    prop,
+    kind: "fan",
+    limb: null,
+    place: [x, z, 0],
+  });
+
+  test("is put into it from the floor below, or from another hand", async () => {
+    viewer.show(lying(0, 1.7, 0), lying(1, 1.6, 0), lying(2, 3, 3));
+    const moved = move(0, 1);
+    expect(puppeteer.sent).toEqual([[1, 0, null]]);
+    viewer.show({ ...lying(1, 0, 0), limb: 0 });
+    expect(await moved).toEqual({ limb: 0, refusal: null });
+    handed[1].root.setPosition(2.2, 1, 0);
+    void move(5);
+    expect(puppeteer.sent[1]).toEqual([1, 5, null]);
+    handed[1].root.setPosition(3, 1, 0);
+  });
+
+  test("is laid down if it is in the hand", () => {
+    viewer.show({ ...lying(3, 0, 0), limb: 1 }, lying(1, 0.5, 0));
+    void move(1);
+    expect(puppeteer.sent).toEqual([[3, null, [1, 0.5, 0]]]);
+  });
+
+  test("is none without a held hand, and beyond its reach", async () => {
+    viewer.show(lying(0, 1.95, 0));
+    expect(await move(0)).toEqual({ limb: null, refusal: "none near" });
+    viewer.show(lying(0, 1.5, 0));
+    expect(await move()).toEqual({ limb: null, refusal: "none near" });
+    expect(puppeteer.sent).toEqual([]);
+  });
 });
 
 test("the place before a performer is half a metre away, and turned like it", () => {
