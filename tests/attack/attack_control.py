@@ -6,7 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable
 
-from bunraku.wire.messages import Alive, Ask, Bond, Claim, Edit, Input, Message, Ping, Release
+from bunraku.wire.messages import Alive, Ask, Bond, Claim, Edit, Input, Message, Ping, Put, Release
 from tests.attack.attack_socket import BINARY, CALM, CLOSED_1008, MAX_WRITE_DEADLINE_S, PING, flood_and_read, repeat
 from tests.attack.raw_socket import RawSocket, connect_websocket, frame
 from tests.attack.registry import Report, Target, attack
@@ -60,6 +60,15 @@ _control_flood(
     "requests_for_a_held_limb",
     "Flood a control connection with requests for a held limb and their withdrawals.",
     _messages(lambda number: Ask(0, bool(number & 1))),
+)
+_control_flood(
+    "props_put_everywhere",
+    "Flood a control connection with requests to put props into all limbs and on the floor.",
+    _messages(
+        lambda number: (
+            Put(number % 8, place=[number / 8, -number / 8, 0.5]) if number & 1 else Put(number % 8, limb=number % 16)
+        )
+    ),
 )
 _control_flood(
     "bonds_of_all_limbs",

@@ -18,6 +18,7 @@ import httpx2
 
 from bunraku.client import Client
 from bunraku.http.access_control import Role
+from bunraku.motion.prop import MAX_PROPS
 from tests.attack.probe import run_probe
 from tests.attack.registry import SOURCE_ADDRESSES, Attack, Target
 from tests.attack.resources import ResourceMeter, find_service_processes
@@ -207,4 +208,5 @@ async def _prepare(url: str, folder: Path) -> tuple[str, str]:
                 await client._http.request(method, path, json=content)
         await asyncio.sleep(2.0)
         await client.record(session, "warm", 1.0)
+        await client.edit_session(session, props={str(number): "fan" for number in range(0, MAX_PROPS, 2)})
     return motion, session
