@@ -1,7 +1,7 @@
 /** Export of motions as files, with its progress in the library. */
-import { downloadMotion } from "../client/motion-download";
+import { downloadMotion, downloadProps } from "../client/motion-download";
 import { ProblemError } from "../client/problem";
-import { type ExportFormat, type ExportSource, exportFile } from "../export/export-file";
+import { type ExportFormat, type ExportSource, exportFile, type PropSource } from "../export/export-file";
 import { fileName } from "../export/file-name";
 import { translate } from "../i18n/translator";
 import type { LibraryPanel } from "../ui/library/library-panel";
@@ -39,8 +39,10 @@ export async function exportMotion(
         );
       sources.push(await downloadMotion(motion.id, { performer, signal, onProgress }));
     }
+    const props = format === "glb" ? await loadProps(motion.id, performers, signal) : null;
     const file = await exportFile(format, motion.name, sources, {
       puppets: { renderFacePng, createModel: createPuppetModel },
+      props,
       signal,
       onProgress: (share) =>
         row.showProgress(translate("writing the file"), FETCH_PROGRESS_SHARE + share * (1 - FETCH_PROGRESS_SHARE)),
@@ -52,4 +54,18 @@ export async function exportMotion(
   } finally {
     row.remove();
   }
+}
+
+/** Download the props of a motion, and the code of their meshes if there are any. */
+async function loadProps(
+  motion: string,
+  performers: readonly number[],
+  signal: AbortSignal,
+): Promise<PropSource | null> {
+  const stores = await downloadProps(motion, signal);
+  if (stores.length === 0) return null;
+  const { createPropShape } = await import("../stage/props/prop-shape").catch(() => {
+    throw ProblemError.unreachable();
+  });
+  return { stores, performers, createModel: createPropShape };
 }

@@ -201,6 +201,9 @@ export class PlaybackController {
       );
     playback.addEventListener("presence", render);
     playback.addEventListener("welcome", render);
+    const renderProps = () => page.strings.renderProps(playback.presence?.props ?? []);
+    playback.addEventListener("presence", renderProps);
+    renderProps();
   }
 
   #bindConnection(playback: RemotePlayback): void {

@@ -2,7 +2,8 @@
 import { AvatarError } from "../avatar/error";
 import type { CameraKeyframe } from "../client/api";
 import type { ClaimState } from "../engine/claim-controller";
-import type { EngineEvent, EngineSettings } from "../engine/message";
+import type { EngineEvent, EngineResults, EngineSettings } from "../engine/message";
+import type { PropRefusalReason } from "../engine/prop-request";
 import { translate } from "../i18n/translator";
 import { createGamepadInput } from "../input/gamepad";
 import { listenToKeyboard } from "../input/keyboard";
@@ -123,6 +124,16 @@ export class StageHost {
   /** Return the camera's movement during the last loop of the motion; empty if the camera was not moved. */
   cameraKeyframes(): Promise<CameraKeyframe[]> {
     return this.options.engine.request({ kind: "camera keyframes" });
+  }
+
+  /** Put a prop into a hand, or lay it down (null). Return null once it is there, or the reason why it stays. */
+  putProp(prop: number, limb: number | null): Promise<PropRefusalReason | null> {
+    return this.options.engine.request({ kind: "put prop", prop, limb });
+  }
+
+  /** Put the nearest prop into a hand that this page holds, or lay down the one that is in it. */
+  moveProp(): Promise<EngineResults["move prop"]> {
+    return this.options.engine.request({ kind: "move prop" });
   }
 
   /** Avatars on the stage. */

@@ -21,6 +21,7 @@ import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
 import { createEditedMotion } from "./motion-edit";
 import type { PlaybackController } from "./playback-controller";
+import { createPropActions, moveNearestProp, type PropContext } from "./prop-actions";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
 import { copyShareLink } from "./share-link";
@@ -100,6 +101,7 @@ export function createUserActions(app: AppParts): UserActions {
           edits: createEditActions(app),
         }
       : {}),
+    ...(pageAccess.allows("control") ? { props: createPropActions(() => propContext(app)) } : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
           add: (motion) => {
@@ -121,6 +123,9 @@ export function createKeyActions(app: AppParts): PageActions {
     ask: () => app.limbs.act("ask"),
     give: () => app.limbs.act("give"),
     join: () => app.limbs.act("join"),
+    prop: () => {
+      if (pageAccess.allows("control")) void moveNearestProp(propContext(app));
+    },
     play: () => app.playback.togglePlaying(),
     back: () => app.playback.current?.seekByBlocks(-1, performance.now()),
     forward: () => app.playback.current?.seekByBlocks(1, performance.now()),
@@ -175,6 +180,16 @@ function createEditActions(app: AppParts): EditActions {
     edit: (motion, edit) =>
       createEditedMotion(motion, edit, app.page.library, (made) => app.playback.playUploadedMotion(made.id)),
     position: ({ id }) => (app.library.currentItem?.id === id ? (app.playback.current?.position ?? null) : null),
+  };
+}
+
+function propContext({ page, playback, stageHost }: AppParts): PropContext {
+  const { current } = playback;
+  return {
+    toast: page.toast,
+    current: current?.kind === "sessions" ? current : null,
+    putProp: (prop, limb) => stageHost.putProp(prop, limb),
+    moveProp: () => stageHost.moveProp(),
   };
 }
 

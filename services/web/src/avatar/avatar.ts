@@ -7,8 +7,8 @@
  */
 import { Group, Matrix4, type Object3D, Quaternion, Vector3 } from "three";
 import type { StagedPose } from "../motion/extension";
-import { BONES, tPoseFigure } from "../motion/humanoid";
-import { createWorldTransforms, type Figure, JOINTS, worldTransforms } from "../motion/skeleton";
+import { BONES, T_POSE_TO_REST, tPoseFigure } from "../motion/humanoid";
+import { createWorldTransforms, type Figure, JOINTS, TIP_JOINTS, worldTransforms } from "../motion/skeleton";
 import { figureScale, restPositions, totalLimbLength } from "../stage/puppet/figure-fit";
 import { floorHeight, handlePosition, type Performer } from "../stage/puppet/performer";
 import { PlantedFeet } from "../stage/puppet/planted-feet";
@@ -199,6 +199,15 @@ export class Avatar implements Performer {
     return out.copy(at).applyMatrix4(node.matrixWorld);
   }
 
+  hand(limb: number, share: number, out: Matrix4): Matrix4 {
+    const { node, at } = this.#handles[limb];
+    const { postRotation } = this.#drives.find((drive) => drive.node === node) as BoneDrive;
+    // From the axes of the file's bone to those of the figure's joint at rest.
+    node.getWorldQuaternion(scratchRotation).multiply(postRotation.clone().invert()).multiply(HAND_TO_JOINT[limb]);
+    scratch.copy(at).multiplyScalar(share / PALM_SHARE);
+    return out.compose(scratch.applyMatrix4(node.matrixWorld), scratchRotation, ONE);
+  }
+
   readonly joint = (name: string): Matrix4 => this.#joints.get(name) as Matrix4;
 
   /**
@@ -301,6 +310,12 @@ export class Avatar implements Performer {
   }
 }
 
+/** Rotations of the hands from the T-pose to the figure's rest. */
+const HAND_TO_JOINT = [0, 1].map((limb) => {
+  const at = TIP_JOINTS[limb + 1] * 4;
+  const [w, x, y, z] = T_POSE_TO_REST.subarray(at, at + 4);
+  return new Quaternion(x, y, z, w).invert();
+});
 const ONE = new Vector3(1, 1, 1);
 const scratch = new Vector3();
 const solePosition = new Vector3();

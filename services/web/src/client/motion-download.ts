@@ -4,11 +4,13 @@
  */
 
 import { DamagedBlock } from "../codec/errors";
+import { PROP_PART, PropTrack } from "../codec/extension/props";
 import { type ExtensionPart, ExtensionTrack } from "../codec/extension/track";
 import { MotionTrack } from "../codec/motion-track";
 import { parseLadder, parseTiming, type Timing } from "../codec/timing";
 import { MotionBlockStore, type TrackBlockStore } from "../playout/block-store";
 import { ExtensionBlockStore } from "../playout/extension-values";
+import { PropBlockStore } from "../playout/prop-store";
 import { unpackServerMessage } from "../wire/client-codec";
 import { MalformedMessage } from "../wire/errors";
 import type { Message, Track } from "../wire/messages";
@@ -71,25 +73,70 @@ export async function downloadMotion(
       extensions[extension.track.content.part] ??= extension;
       missing.push(missingBlocks(index, extension, highest, isUsed));
     }
-    const requests = missing.flatMap((each) => each.indices.map((index) => ({ ...each, index })));
-    const total = Math.max(requests.length, 1);
-    let doneCount = 0;
-    const fetchMissing = async () => {
-      for (let request = requests.shift(); request !== undefined; request = requests.shift()) {
-        const { track: number, level, index } = request;
-        const { block } = await fetchMessage(`${base}/blocks/${level}/${index}?track=${number}`, "Data", signal);
-        request.store.put(index, level, block);
-        signal?.throwIfAborted();
-        onProgress?.(++doneCount / total);
-      }
-    };
-    await Promise.all(Array.from({ length: MAX_CONCURRENT_REQUESTS }, fetchMissing));
+    await fetchBlocks(base, missing, { onProgress, signal });
     return { store, frames, extensions };
   } catch (error) {
-    signal?.throwIfAborted();
-    if (error instanceof DamagedBlock || error instanceof MalformedMessage)
-      throw new ProblemError(0, "This motion cannot be read", error.message);
-    throw error;
+    throw toProblem(error, signal);
+  }
+}
+
+/**
+ * Download the props of a motion, of those tracks that can be read.
+ *
+ * @throws ProblemError if the download fails, or the reason of `signal` if it is aborted
+ */
+export async function downloadProps(motion: string, signal?: AbortSignal): Promise<PropBlockStore[]> {
+  const base = `/v1/motions/${encodeURIComponent(motion)}`;
+  try {
+    const { tracks } = await fetchMessage(`${base}/description`, "Description", signal);
+    const found = tracks.flatMap((track, index) => {
+      const opened = track.type === "extension" && track["part"] === PROP_PART ? openProps(track) : null;
+      return opened ? [{ index, store: opened }] : [];
+    });
+    const missing = found.map(({ index, store }) => missingBlocks(index, store, 0, () => true));
+    await fetchBlocks(base, missing, { signal });
+    return found.map(({ store }) => store);
+  } catch (error) {
+    throw toProblem(error, signal);
+  }
+}
+
+/** Fetch missing blocks, several at a time, into their stores. */
+async function fetchBlocks(
+  base: string,
+  missing: readonly MissingBlocks[],
+  { onProgress, signal }: { onProgress?: MotionDownloadOptions["onProgress"]; signal: AbortSignal | undefined },
+): Promise<void> {
+  const requests = missing.flatMap((each) => each.indices.map((index) => ({ ...each, index })));
+  const total = Math.max(requests.length, 1);
+  let doneCount = 0;
+  const fetchMissing = async () => {
+    for (let request = requests.shift(); request !== undefined; request = requests.shift()) {
+      const { track: number, level, index } = request;
+      const { block } = await fetchMessage(`${base}/blocks/${level}/${index}?track=${number}`, "Data", signal);
+      request.store.put(index, level, block);
+      signal?.throwIfAborted();
+      onProgress?.(++doneCount / total);
+    }
+  };
+  await Promise.all(Array.from({ length: MAX_CONCURRENT_REQUESTS }, fetchMissing));
+}
+
+/** Return the error to throw; throw the reason of `signal` if it is aborted. */
+function toProblem(error: unknown, signal: AbortSignal | undefined): unknown {
+  signal?.throwIfAborted();
+  return error instanceof DamagedBlock || error instanceof MalformedMessage
+    ? new ProblemError(0, "This motion cannot be read", error.message)
+    : error;
+}
+
+/** Return a store for a track of props, null if the track cannot be read. */
+function openProps(track: Track): PropBlockStore | null {
+  try {
+    return new PropBlockStore(PropTrack.fromDescription(track));
+  } catch (error) {
+    if (!(error instanceof DamagedBlock)) throw error;
+    return null;
   }
 }
 

@@ -394,6 +394,16 @@ export class Engine {
           ? (stage?.cameraRecorder.movedKeyframes(clock - viewer.duration * 1e6) ?? [])
           : [];
       }
+      case "put prop": {
+        const { putProp } = await import("./prop-request");
+        const playback = this.#playback;
+        return playback && putProp(playback, stage?.performers ?? [], request.prop, request.limb);
+      }
+      case "move prop": {
+        const { moveNearestProp } = await import("./prop-request");
+        const { hands, stage: { performers } = { performers: [] } } = this.#controller ?? {};
+        return moveNearestProp(this.#playback, performers, (limb) => Boolean(hands?.source(limb)));
+      }
     }
   }
 

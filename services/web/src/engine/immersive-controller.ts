@@ -45,7 +45,7 @@ export class ImmersiveController {
       return null;
     }
     const grips = claims.viewOnly ? [] : this.#hands.update(hands, now);
-    const { poses, strings, lights, seconds } = controller.advance(now, this.#hands.limbsInReach);
+    const { poses, strings, lights, props, seconds } = controller.advance(now, this.#hands.limbsInReach);
     // Nothing is drawn here, but limbs are pulled in the frames of the performers' joints.
     controller.stage.performers.forEach((performer, k) => {
       const pose = poses[k];
@@ -62,6 +62,7 @@ export class ImmersiveController {
       poses,
       strings: strings.map((string) => ({ ...string, pullTarget: string.pullTarget?.toArray() ?? null })),
       lights,
+      props,
       performer: controller.selectedPerformer,
       grips,
     };

@@ -18,9 +18,10 @@ import type { ScreenBox } from "../stage/camera/screen-box";
 import type { Theme } from "../stage/scenery/look";
 import type { StringState } from "../stage/strings/strings";
 import type { LabelMetrics, LabelPositions } from "../ui/strings/label-layout";
-import type { Presence, TimelineState } from "../wire/messages";
+import type { Presence, PropPresence, TimelineState } from "../wire/messages";
 import type { AskOffer, ClaimState } from "./claim-controller";
 import type { PlaybackKind } from "./playback";
+import type { PropRefusalReason } from "./prop-request";
 
 /** Camera that is fixed, as the seven numbers of a motion's camera (`proto/codec.md`, 2.14). */
 export type FixedCamera = readonly [
@@ -118,7 +119,10 @@ export type EngineCommand =
 export type EngineRequest =
   | { kind: "picture" }
   | { kind: "load avatar"; performer: number; file: File }
-  | { kind: "camera keyframes" };
+  | { kind: "camera keyframes" }
+  | { kind: "put prop"; prop: number; limb: number | null }
+  /** Put the nearest prop into a hand that this page holds, or lay down the one that is in it. */
+  | { kind: "move prop" };
 
 /** Results of the requests, by their kind. */
 export interface EngineResults {
@@ -127,6 +131,9 @@ export interface EngineResults {
   "load avatar": string | null;
   /** Camera's movement during the last loop of the motion; empty if the camera was not moved. */
   "camera keyframes": CameraKeyframe[];
+  /** Null once the prop is there, or the reason why it stays. */
+  "put prop": PropRefusalReason | null;
+  "move prop": { readonly limb: number | null; readonly refusal: PropRefusalReason | null };
 }
 
 /** Failure of a request. */
@@ -161,6 +168,7 @@ export interface ImmersiveFrame {
   /** Strings by limb number. */
   readonly strings: readonly ImmersiveString[];
   readonly lights: readonly LightState[];
+  readonly props: readonly PropPresence[];
   /** Selected performer. */
   readonly performer: number;
   /** What each tracked hand does. */

@@ -16,6 +16,7 @@ import { Stage } from "../stage/stage";
 import type { StringState } from "../stage/strings/strings";
 import type { LimbState } from "../ui/limb-state";
 import { CROWD, performerOfLimb } from "../wire/limbs";
+import type { PropPresence } from "../wire/messages";
 import type { ClaimController } from "./claim-controller";
 import type { Playback } from "./playback";
 
@@ -51,6 +52,7 @@ export interface StageContent {
   limbs: readonly LimbState[];
   strings: readonly StringState[];
   lights: readonly LightState[];
+  props: readonly PropPresence[];
   /** Seconds since the last one. */
   seconds: number;
 }
@@ -152,7 +154,8 @@ export class StageController {
     const { limbController, pointer, stage } = this;
     const viewer = this.#playback?.viewer;
     pointer.update(now);
-    const { poses, limbs, strings, lights, seconds } = this.advance(now, [focusedLimb]);
+    const { poses, limbs, strings, lights, props, seconds } = this.advance(now, [focusedLimb]);
+    stage.props = props;
     // The camera must not move under a finger that drags a limb.
     if (!pointer.isDragging) stage.selectedPerformer = limbController.viewOnly ? null : this.selectedPerformer;
     const camera = this.#camera ?? viewer?.cameraAt(now);
@@ -193,7 +196,14 @@ export class StageController {
         isDimmed: !isSelected,
       };
     });
-    return { poses, limbs, strings, lights: viewer?.lightsAt(now) ?? [], seconds };
+    return {
+      poses,
+      limbs,
+      strings,
+      lights: viewer?.lightsAt(now) ?? [],
+      props: viewer?.propsAt(now) ?? [],
+      seconds,
+    };
   }
 
   /**

@@ -1,9 +1,13 @@
 /** Export of motions as a file, computed in time slices so that the page stays responsive. */
 
+import type { PropKind } from "../motion/props";
 import { type Figure, figureKey } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
+import type { PropBlockStore } from "../playout/prop-store";
 import { writeBvh } from "./bvh";
 import { type AnimatedPuppet, type PuppetModel, writeGlb } from "./glb";
+import type { PropModel } from "./glb-props";
+import { sampleProps } from "./prop-samples";
 import { type ExtensionStores, type IncrementalTask, type SampledMotion, sampleMotion } from "./sampled-motion";
 import { runInSlices } from "./time-slice";
 import { writeVrma } from "./vrma";
@@ -22,8 +26,17 @@ export interface PuppetModelSource {
   renderFacePng(): Promise<Uint8Array<ArrayBuffer>>;
 }
 
+/** Blocks of the props of the motion, the numbers of the exported performers on the stage, and meshes by kind. */
+export interface PropSource {
+  readonly stores: readonly PropBlockStore[];
+  readonly performers: readonly number[];
+  createModel(kind: PropKind): PropModel;
+}
+
 export interface ExportOptions {
   puppets: PuppetModelSource;
+  /** Props of the motion, for files that show them. */
+  props?: PropSource | null;
   onProgress?: (share: number) => void;
   signal?: AbortSignal;
 }
@@ -43,7 +56,7 @@ export async function exportFile(
   format: ExportFormat,
   name: string,
   sources: readonly ExportSource[],
-  { puppets, onProgress, signal }: ExportOptions,
+  { puppets, props, onProgress, signal }: ExportOptions,
 ): Promise<Blob> {
   const sliceOptions = (from: number, to: number) => ({
     onProgress: (share: number) => onProgress?.(from + (to - from) * share),
@@ -65,6 +78,7 @@ export async function exportFile(
       await runInSlices(createModels(motions, puppets), sliceOptions(0.5, 0.5)),
       name,
       await puppets.renderFacePng(),
+      props ? { props: sampleProps(props.stores, motions[0], props.performers), createModel: props.createModel } : null,
     );
   };
   const parts = await runInSlices(await write(), sliceOptions(0.5, 1));

@@ -7,6 +7,7 @@ import type { Placement } from "../motion/placement";
 import { type Figure, JOINTS, restPose } from "../motion/skeleton";
 import { ExportSkeleton } from "./export-skeleton";
 import { addFaceChannel, createHeadMesh, type PuppetHead, targetNames } from "./glb-face";
+import { addProps, type ExportedProps, PerformerPath } from "./glb-props";
 import { frameTimes, type GltfArray, GltfBuilder, writeRotation } from "./gltf";
 import { FRAMES_PER_STEP, frameValuesAt, type IncrementalTask, poseAt, type SampledMotion } from "./sampled-motion";
 
@@ -24,6 +25,8 @@ export interface PuppetModel {
   /** Triangles with the face texture, and all others. */
   face: Uint32Array<ArrayBuffer>;
   body: Uint32Array<ArrayBuffer>;
+  /** Height of the balls of the feet above the floor, metres. */
+  soleHeight: number;
   /** Return the head as a mesh of its own, and the triangles of all other parts. */
   separateHead(): { head: PuppetHead; rest: Uint32Array<ArrayBuffer> };
   /**
@@ -46,30 +49,47 @@ export interface AnimatedPuppet {
 /**
  * Write all puppets as one scene with one animation of this name. Each hangs from its own node, "dancer 1" and so on,
  * at its placement on the stage; a single one at the centre needs none. `face` is the face texture as PNG; without it
- * faces are white. The heads of those whose motion has a face are meshes with morph targets.
+ * faces are white. The heads of those whose motion has a face are meshes with morph targets. Props are nodes of their
+ * own.
  */
 export function* writeGlb(
   puppets: readonly AnimatedPuppet[],
   name: string,
   face: Uint8Array<ArrayBuffer> | null,
+  props: ExportedProps | null = null,
 ): IncrementalTask<Uint8Array<ArrayBuffer>[]> {
   const asset = new GltfBuilder();
-  const { bones, faces, roots } = addPuppets(asset, puppets, face);
+  const { meshes, bones, faces, roots } = addPuppets(asset, puppets, face);
+  const paths: PerformerPath[] = [];
   for (const [index, puppet] of puppets.entries()) {
-    for (const share of addAnimation(asset, bones[index], faces[index], puppet)) yield (index + share) / puppets.length;
+    const { motion, model } = puppet;
+    const skeleton = skeletonOf(motion);
+    const path = new PerformerPath(skeleton, motion, model.soleHeight);
+    paths.push(path);
+    for (const share of addAnimation(asset, bones[index], faces[index], puppet, skeleton, path))
+      yield (index + share) / puppets.length;
   }
+  if (props) roots.push(...addProps(asset, meshes, props, paths, puppets[0].motion));
   return asset.build(roots, name);
 }
 
-/** Animate the joints and sleeves, which are the nodes from `first` on, and the node of the face, if there is one. */
+function skeletonOf({ figure, extension, hands }: SampledMotion): ExportSkeleton {
+  return new ExportSkeleton(figure, extension?.extension, hands?.hands);
+}
+
+/**
+ * Animate the joints and sleeves, which are the nodes from `first` on, and the node of the face, if there is one.
+ * Record the path of hands and feet.
+ */
 function* addAnimation(
   asset: GltfBuilder,
   first: number,
   face: number | undefined,
   { motion, model }: AnimatedPuppet,
+  skeleton: ExportSkeleton,
+  path: PerformerPath,
 ): IncrementalTask<void> {
   const { fps, frames, roots } = motion;
-  const skeleton = new ExportSkeleton(motion.figure, motion.extension?.extension, motion.hands?.hands);
   const rotations = Array.from({ length: skeleton.count + SLEEVES.length }, () => new Float32Array(frames * 4));
   const pose: StagedPose = restPose();
   const sleeveRotations = new Float64Array(8),
@@ -79,6 +99,7 @@ function* addAnimation(
     skeleton.rotations(poseAt(motion, frame, pose), values, jointRotations);
     pose.extended = skeleton.extend(pose, values.extension);
     model.poseSleeves(pose, frame === 0 ? 0 : 1 / fps, sleeveRotations);
+    path.record(frame, pose.root, jointRotations);
     for (let joint = 0; joint < skeleton.count; joint++)
       writeRotation(rotations[joint], frame * 4, jointRotations, joint * 4);
     for (let sleeve = 0; sleeve < SLEEVES.length; sleeve++)
@@ -105,7 +126,7 @@ function addPuppets(
   asset: GltfBuilder,
   puppets: readonly AnimatedPuppet[],
   face: Uint8Array<ArrayBuffer> | null,
-): { bones: number[]; faces: (number | undefined)[]; roots: number[] } {
+): { meshes: object[]; bones: number[]; faces: (number | undefined)[]; roots: number[] } {
   const { nodes } = asset;
   const meshes: object[] = [],
     skins: object[] = [],
@@ -114,9 +135,9 @@ function addPuppets(
     roots: number[] = [];
   const shared = new Map<PuppetModel, Map<string, SharedParts>>();
   puppets.forEach(({ motion, model }, index) => {
-    const { figure, placement: place, extension, hands } = motion;
+    const { figure, placement: place } = motion;
     const first = nodes.length;
-    const skeleton = new ExportSkeleton(figure, extension?.extension, hands?.hands);
+    const skeleton = skeletonOf(motion);
     addBones(asset, skeleton);
     const skin = createSkin(figure, skeleton);
     const variants = shared.get(model) ?? new Map<string, SharedParts>();
@@ -160,7 +181,7 @@ function addPuppets(
       ? { textures: [{ source: 0 }], images: [{ bufferView: asset.addBufferView(face), mimeType: "image/png" }] }
       : {}),
   });
-  return { bones, faces, roots };
+  return { meshes, bones, faces, roots };
 }
 
 /** Mesh of a puppet, and that of its head, if it has morph targets. */

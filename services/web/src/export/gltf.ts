@@ -27,7 +27,7 @@ export interface GltfNode {
 }
 
 /** Properties that channels change, and the types of their values. */
-const CHANNEL_TYPES = { translation: "VEC3", rotation: "VEC4", weights: "SCALAR" } as const;
+const CHANNEL_TYPES = { translation: "VEC3", rotation: "VEC4", scale: "VEC3", weights: "SCALAR" } as const;
 
 export class GltfBuilder {
   /** Further properties of the asset: meshes, materials, skins, extensions. */
@@ -110,12 +110,21 @@ export class GltfBuilder {
     return this.#accessors.length - 1;
   }
 
-  /** Add a channel that changes a node linearly between `values` at the times of an accessor. */
-  addChannel(node: number, path: keyof typeof CHANNEL_TYPES, times: number, values: Float32Array<ArrayBuffer>): void {
+  /**
+   * Add a channel that changes a node to `values` at the times of an accessor: linearly between them, or with STEP at
+   * once.
+   */
+  addChannel(
+    node: number,
+    path: keyof typeof CHANNEL_TYPES,
+    times: number,
+    values: Float32Array<ArrayBuffer>,
+    interpolation: "LINEAR" | "STEP" = "LINEAR",
+  ): void {
     this.#samplers.push({
       input: times,
       output: this.addAccessor(values, CHANNEL_TYPES[path]),
-      interpolation: "LINEAR",
+      interpolation,
     });
     this.#channels.push({ sampler: this.#samplers.length - 1, target: { node, path } });
   }

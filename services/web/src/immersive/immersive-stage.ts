@@ -15,6 +15,7 @@ import {
 } from "three";
 import type { ImmersiveFrame } from "../engine/message";
 import { FollowRig } from "../stage/camera/follow-rig";
+import { PropGroup } from "../stage/props/prop-group";
 import { type PerformerFactory, PerformerGroup } from "../stage/puppet/performer-group";
 import { createEnvironmentMap } from "../stage/scenery/environment-map";
 import { createLights } from "../stage/scenery/lighting";
@@ -54,6 +55,7 @@ export class ImmersiveStage {
   readonly strings = new Strings();
   readonly #floorHeight: IUniform<number> = { value: 0 };
   readonly #performerGroup = new PerformerGroup(this.#floorHeight);
+  readonly #propGroup = new PropGroup();
   readonly #rig = new FollowRig();
   readonly #lights = createLights();
   readonly #scenery = new Scenery();
@@ -100,6 +102,7 @@ export class ImmersiveStage {
       this.#hall,
       this.#pedestal,
       this.#performerGroup.group,
+      this.#propGroup.group,
       this.strings.group,
       this.room,
     );
@@ -132,7 +135,7 @@ export class ImmersiveStage {
    * `canMove` is false while the stage must stay where it is, as a hand pulls a limb.
    */
   apply(
-    { figures, front, poses, strings, lights, performer }: ImmersiveFrame,
+    { figures, front, poses, strings, lights, props, performer }: ImmersiveFrame,
     interval: number,
     canMove: boolean,
   ): void {
@@ -147,6 +150,13 @@ export class ImmersiveStage {
     if (visiblePerformers.length === 0) return;
     this.#rig.follow(visiblePerformers, seconds);
     this.#floorHeight.value = this.#rig.group.position.y;
+    const isNew = this.#propGroup.update(
+      props,
+      performers,
+      this.#floorHeight.value,
+      this.options.reducedMotion ? Infinity : seconds,
+    );
+    if (isNew) this.renderer.compile(this.scene, this.camera);
     const spot = new Vector3().setFromMatrixPosition((performers[performer] ?? visiblePerformers[0]).root);
     this.#place(spot, performer, canMove);
     this.#rig.group.updateMatrixWorld(true);
@@ -197,6 +207,7 @@ export class ImmersiveStage {
   /** Release all graphics resources but those of the renderer. */
   dispose(): void {
     this.#performerGroup.dispose();
+    this.#propGroup.dispose();
     this.#scenery.dispose();
     this.#pedestal.geometry.dispose();
     this.#pedestal.material.dispose();
@@ -206,6 +217,7 @@ export class ImmersiveStage {
   #applyQuality(isSimple: boolean): void {
     this.#lights.castsShadows = !isSimple;
     this.#performerGroup.setQuality(false, isSimple);
+    this.#propGroup.usesSimpleMaterials = isSimple;
     this.renderer.compile(this.scene, this.camera);
   }
 

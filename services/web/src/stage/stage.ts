@@ -7,11 +7,13 @@ import type { StagedPose } from "../motion/extension";
 import { type Figure, LIMBS } from "../motion/skeleton";
 import type { LightState } from "../playout/light-state";
 import { limbNumber } from "../wire/limbs";
+import type { PropPresence } from "../wire/messages";
 import { AudienceCamera, type Framing } from "./camera/audience-camera";
 import { CameraRecorder } from "./camera/camera-recorder";
 import { FollowRig } from "./camera/follow-rig";
 import type { ScreenBox, WorldExtent } from "./camera/screen-box";
 import { type ScreenPosition, ScreenProjection } from "./camera/screen-projection";
+import type { PropGroup } from "./props/prop-group";
 import type { Performer } from "./puppet/performer";
 import { type PerformerFactory, PerformerGroup } from "./puppet/performer-group";
 import type { StageCanvas } from "./rendering/canvas";
@@ -54,7 +56,12 @@ export class Stage {
   readonly renderer: WebGLRenderer;
   /** Performer that this page's inputs act on, which a narrow picture frames; null frames all. */
   selectedPerformer: number | null = null;
+  /** Props on the stage. */
+  props: readonly PropPresence[] = [];
   readonly #performerGroup: PerformerGroup;
+  /** Null until there is a prop. */
+  #propGroup: PropGroup | null = null;
+  #isLoadingProps = false;
   readonly #scenery = new Scenery(this.rig.floorOffset);
   readonly #lights = createLights();
   readonly #floorHeight: IUniform<number> = { value: 0 };
@@ -233,6 +240,7 @@ export class Stage {
       this.#floorHeight.value = rig.group.position.y;
     }
     rig.group.updateMatrixWorld(true);
+    this.#updateProps(seconds);
     this.#updateAudience(hasPose ? visiblePerformers : [], seconds, motionCamera);
     // The scenery is as wide as the picture of all performers.
     const { distanceScale } = audience;
@@ -270,6 +278,7 @@ export class Stage {
   /** Release all graphics resources; the stage cannot draw afterwards. */
   dispose(): void {
     this.#performerGroup.dispose();
+    this.#propGroup?.dispose();
     this.#scenery.dispose();
     this.scene.environment?.dispose();
     this.#frameRenderer.dispose();
@@ -340,7 +349,11 @@ export class Stage {
     const bars = this.performers.flatMap((_, performer) =>
       LIMBS.map((_, limb) => this.barBox(limbNumber(performer, limb))).filter((box) => box !== null),
     );
-    return [...this.#performerGroup.boxes(this.#projection), ...bars];
+    return [
+      ...this.#performerGroup.boxes(this.#projection),
+      ...(this.#propGroup?.boxes(this.#projection) ?? []),
+      ...bars,
+    ];
   }
 
   #addScenery(): void {
@@ -360,7 +373,36 @@ export class Stage {
         selected < 0 ? null : selected,
       );
     const framed = audience.hidesPerformers && selected >= 0 ? [posed[selected]] : posed;
-    audience.update(seconds, posed.length > 0 ? this.#handReach(framed) : 0, motionCamera);
+    const reach =
+      posed.length > 0 ? Math.max(this.#handReach(framed), this.#propGroup?.reach(audience.camera) ?? 0) : 0;
+    audience.update(seconds, reach, motionCamera);
+  }
+
+  /** Show the props. Their code is loaded with the first. */
+  #updateProps(seconds: number): void {
+    if (!this.#propGroup) {
+      if (this.props.length > 0) void this.#loadProps();
+      return;
+    }
+    const isNew = this.#propGroup.update(
+      this.props,
+      this.performers,
+      this.#floorHeight.value,
+      this.#reducedMotion ? Infinity : seconds,
+    );
+    if (isNew) this.#compileShaders();
+  }
+
+  async #loadProps(): Promise<void> {
+    if (this.#isLoadingProps) return;
+    this.#isLoadingProps = true;
+    // If this fails, the next frame tries again.
+    const chunk = await import("./props/prop-group").catch(() => null);
+    this.#isLoadingProps = false;
+    if (!chunk) return;
+    this.#propGroup = new chunk.PropGroup();
+    this.scene.add(this.#propGroup.group);
+    this.#applyQuality();
   }
 
   #updateStrings(states: readonly StringState[], seconds: number): void {
@@ -416,6 +458,7 @@ export class Stage {
     // Simple materials need no environment; a look that was chosen meanwhile has made none.
     if (!simpleMaterials && this.scene.environment === null) this.#updateEnvironment();
     this.#performerGroup.setQuality(this.#look.dark && reflection, simpleMaterials);
+    if (this.#propGroup) this.#propGroup.usesSimpleMaterials = simpleMaterials;
     this.#scenery.usesSimpleMaterials = simpleMaterials;
   }
 

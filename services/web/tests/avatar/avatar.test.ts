@@ -1,4 +1,4 @@
-import { Group, type Object3D, Quaternion, Vector3 } from "three";
+import { Group, Matrix4, type Object3D, Quaternion, Vector3 } from "three";
 import { beforeAll, describe, expect, test } from "vitest";
 import { Avatar } from "../../src/avatar/avatar";
 import { AvatarModel } from "../../src/avatar/model";
@@ -172,6 +172,21 @@ describe.each(Object.entries(FILES))("%s", (_, options) => {
       const height = avatar.root.elements[13];
       if (before !== null) expect(Math.abs(height - before)).toBeLessThan(0.03);
       before = height;
+    }
+  });
+
+  test("has hands with the axes of the figure's", () => {
+    const avatar = new Avatar(model, figure);
+    for (const time of [0, 0.4, 1.3]) {
+      avatar.apply(poseAt(time), 0);
+      for (const [limb, name] of ["l_wrist", "r_wrist"].entries()) {
+        const hand = avatar.hand(limb, 0.5, new Matrix4());
+        const wanted = new Matrix4().extractRotation(avatar.joint(name)).elements;
+        new Matrix4().extractRotation(hand).elements.forEach((value, k) => expect(value).toBeCloseTo(wanted[k], 5));
+        // In the palm, beyond the handle.
+        const [place, handle] = [new Vector3().setFromMatrixPosition(hand), avatar.handle(limb, new Vector3())];
+        expect(place.distanceTo(handle)).toBeLessThan(0.05);
+      }
     }
   });
 

@@ -18,6 +18,9 @@ const DEFERRED_FILES = [
   /extension-/,
   /\/hands-/,
   /planted-feet-/,
+  /prop-group-/,
+  // what the props on the stage share with their controls
+  /\/props-/,
   /edge-smoothing-/,
   // what the solver of limbs shares with that of bonds
   /point-/,

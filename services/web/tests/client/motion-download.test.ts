@@ -1,9 +1,10 @@
 import { afterEach, expect, test, vi } from "vitest";
-import { downloadMotion } from "../../src/client/motion-download";
+import { downloadMotion, downloadProps } from "../../src/client/motion-download";
 import { ProblemError } from "../../src/client/problem";
 import { MotionBlockStore } from "../../src/playout/block-store";
 import { pack } from "../../src/wire/codec";
 import { type BlockVectors, goldenDescription, goldenTrack } from "../golden-motion";
+import { propVectors } from "../golden-props";
 import { decodeBase64, loadVectors } from "../golden-vectors";
 
 const { valid } = loadVectors<BlockVectors>("blocks");
@@ -118,4 +119,37 @@ test("abort rejects with its reason", async () => {
   await expect(downloadMotion("m", { signal: abort.signal, onProgress: () => abort.abort(reason) })).rejects.toBe(
     reason,
   );
+});
+
+test("props are those of the tracks that can be read, at all frames", async () => {
+  const { tracks, valid: blocks } = propVectors();
+  const damaged = { ...tracks[1], codec: "bunraku.prop/9" };
+  const paths = stubServer((path) => {
+    if (path.endsWith("/description"))
+      return pack({ name: "Description", motion: "m", first: null, tracks: [goldenDescription(), damaged, tracks[0]] });
+    const index = Number(/\/blocks\/0\/(\d+)\?track=2$/.exec(path)?.[1]);
+    const { block } = blocks.find((one) => one.track === 0 && one.index === index) as { block: string };
+    return pack({ name: "Data", track: 2, rate: 0, index, block: decodeBase64(block) });
+  });
+  const [store, ...others] = await downloadProps("m/1");
+  expect(others).toEqual([]);
+  expect([...store.levels]).toEqual([0, 0, 0, 0]);
+  expect(store.propsAt(500_000, 0).map(({ kind }) => kind)).toContain("fan");
+  expect(paths.filter((path) => path.includes("/blocks/"))).toHaveLength(4);
+});
+
+test("a motion without props needs its description alone", async () => {
+  const paths = stubServer();
+  expect(await downloadProps("m")).toEqual([]);
+  expect(paths).toEqual(["/v1/motions/m/description"]);
+});
+
+test("props that are damaged are a problem", async () => {
+  const { tracks } = propVectors();
+  stubServer((path) =>
+    path.endsWith("/description")
+      ? pack({ name: "Description", motion: "m", first: null, tracks: [tracks[0]] })
+      : pack({ name: "Data", track: 0, rate: 0, index: 0, block: Uint8Array.of(9, 9) }),
+  );
+  await expect(downloadProps("m")).rejects.toThrow(ProblemError);
 });

@@ -12,6 +12,7 @@ import { createLimbController, FakePuppeteer } from "../input/fake-puppeteer";
 import { createStandingPuppet } from "../stage/puppet/figures";
 
 const LEFT_HAND = 0;
+const PROPS = [{ prop: 0, kind: "fan", limb: LEFT_HAND, place: [0, 0, 0] }];
 const puppet = createStandingPuppet();
 
 let hands: LimbController;
@@ -37,7 +38,7 @@ beforeEach(() => {
       highlighted = limbs;
       const pullTarget = hands.pullTarget(LEFT_HAND);
       const strings = [{ puppeteer: 0, isHighlighted: true, pullTarget }];
-      return { poses: [pose], limbs: [], strings, lights: [], seconds: 0 };
+      return { poses: [pose], limbs: [], strings, lights: [], props: PROPS, seconds: 0 };
     },
   };
   const claims = {
@@ -65,6 +66,7 @@ test("a frame can be sent to another realm, and has the pull of the hand", () =>
   expect(structuredClone(frame)).toEqual(frame);
   expect(frame?.grips).toEqual([{ name: "right", kind: "holding", limb: LEFT_HAND }]);
   expect([frame?.front, frame?.performer, highlighted]).toEqual([0.5, 0, [LEFT_HAND]]);
+  expect(frame?.props).toEqual(PROPS);
   frame?.strings[0].pullTarget?.forEach((value, axis) => expect(value).toBeCloseTo(hand.position[axis]));
 });
 

@@ -30,7 +30,7 @@ test("session of another server is found, opened and edited there", async () => 
   const urls = () => FakeWebSocket.opened.map(({ url }) => url);
   const playback = new Playback("on", "Aiko", () => undefined, { access });
   expect(urls()).toEqual([
-    "wss://stage.example/v1/sessions/on/stream?extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts",
+    "wss://stage.example/v1/sessions/on/stream?extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts%2Cprops",
     "wss://stage.example/v1/sessions/on/control?name=Aiko",
   ]);
   playback.edit({ playing: false });
@@ -39,7 +39,7 @@ test("session of another server is found, opened and edited there", async () => 
   FakeWebSocket.opened.length = 0;
   const viewOnly = new Playback("on", "Aiko", () => undefined, { access, viewOnly: true });
   expect(urls()).toEqual([
-    "wss://stage.example/v1/sessions/on/stream?extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts",
+    "wss://stage.example/v1/sessions/on/stream?extensions=true&parts=body%2Cfingers%2Cface%2Ccontacts%2Cprops",
   ]);
   viewOnly.close();
   FakeWebSocket.remove();

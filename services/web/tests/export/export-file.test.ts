@@ -1,7 +1,11 @@
 import { expect, test } from "vitest";
 import { type ExportFormat, exportFile } from "../../src/export/export-file";
 import type { Figure } from "../../src/motion/skeleton";
+import { PropBlockStore } from "../../src/playout/prop-store";
+import { createPropShape } from "../../src/stage/props/prop-shape";
 import { createPuppetModel } from "../../src/stage/puppet/puppet-model";
+import { goldenPropTracks, propVectors } from "../golden-props";
+import { decodeBase64 } from "../golden-vectors";
 import { goldenStore } from "./motions";
 
 const source = { store: goldenStore(), frames: 78 };
@@ -77,3 +81,16 @@ interface Described {
 function jsonOf(file: Buffer): Described {
   return JSON.parse(file.subarray(20, 20 + file.readUInt32LE(12)).toString()) as Described;
 }
+
+test("a GLB has the props of the motion, other formats do not", async () => {
+  const stores = [new PropBlockStore(goldenPropTracks()[0])];
+  for (const { index, block } of propVectors().valid.filter(({ track }) => track === 0))
+    stores[0].put(index, 0, decodeBase64(block));
+  const props = { stores, performers: [0], createModel: createPropShape };
+  const nodesOf = async (format: ExportFormat) => {
+    const file = await exportFile(format, "a dance", [source], { puppets, props });
+    return jsonOf(Buffer.from(await file.arrayBuffer())).nodes.map(({ name }) => name);
+  };
+  expect((await nodesOf("glb")).filter((name) => name.startsWith("prop"))).toEqual(["prop 1 fan"]);
+  expect((await nodesOf("vrma")).filter((name) => name.startsWith("prop"))).toEqual([]);
+});

@@ -1,9 +1,10 @@
-import { Group, Matrix4, type Vector3, type WebGLRenderer } from "three";
+import { Group, Matrix4, Vector3, type WebGLRenderer } from "three";
 import { beforeEach, expect, test } from "vitest";
 import type { ImmersiveFrame } from "../../src/engine/message";
 import { ImmersiveStage } from "../../src/immersive/immersive-stage";
 import { type Figure, type Pose, restPose } from "../../src/motion/skeleton";
 import type { Performer } from "../../src/stage/puppet/performer";
+import type { PropPresence } from "../../src/wire/messages";
 import { createStandardFigure } from "../stage/puppet/figures";
 
 /** Performer without a mesh, whose rings are at its root. */
@@ -21,6 +22,9 @@ class FakePerformer implements Performer {
   }
   handle(_: number, out: Vector3): Vector3 {
     return out.setFromMatrixPosition(this.root);
+  }
+  hand(_limb: number, _share: number, out: Matrix4): Matrix4 {
+    return out;
   }
   joint(): Matrix4 {
     return this.root;
@@ -58,13 +62,14 @@ function show(
   performer = 0,
   canMove = true,
   figures: Figure[] | null = FIGURES,
+  props: readonly PropPresence[] = [],
 ): void {
   const poses = places.map(([x, z]) => {
     const pose = restPose();
     pose.root.set([x, 1, z]);
     return pose;
   });
-  const frame: ImmersiveFrame = { figures, front: 0, poses, strings: [], lights: [], performer, grips: [] };
+  const frame: ImmersiveFrame = { figures, front: 0, poses, strings: [], lights: [], props, performer, grips: [] };
   stage.apply(frame, 0.02, canMove);
   stage.updateMatrices();
 }
@@ -138,8 +143,22 @@ test("another size takes effect once no hand pulls a limb, on a pedestal", () =>
   expect(inRoom(0).floor).toBeCloseTo(0.98);
 });
 
+test("props are on the floor of the stage and in hands", () => {
+  const laid = { prop: 0, kind: "ball", limb: null, place: [0.5, 0.2, 0] };
+  show([[0, 0]], 0, true, FIGURES, [laid, { prop: 1, kind: "fan", limb: 1, place: [0, 0, 0] }]);
+  const [ball, fan] = stage.scene.getObjectByName("props")?.children ?? [];
+  const { x, y, z } = new Vector3().setFromMatrixPosition(ball.matrixWorld);
+  // Above the floor by its radius.
+  expect([x, y, z]).toEqual([0.5, 0.1 + 0.11, 0.2].map((value) => expect.closeTo(value, 9)));
+  expect(fan.visible).toBe(true);
+});
+
 test("without a pose nothing is placed, and no ring is reached", () => {
   expect(stage.ringOf(0)).toBe(null);
-  stage.apply({ figures: FIGURES, front: 0, poses: [null], strings: [], lights: [], performer: 0, grips: [] }, 0, true);
+  stage.apply(
+    { figures: FIGURES, front: 0, poses: [null], strings: [], lights: [], props: [], performer: 0, grips: [] },
+    0,
+    true,
+  );
   expect(stage.ringOf(0)).toBe(null);
 });

@@ -7,6 +7,7 @@ export function recordPageActions(calls: string[]): PageActions {
     "ask",
     "give",
     "join",
+    "prop",
     "play",
     "back",
     "forward",

@@ -119,7 +119,7 @@ function normaliseWeights(weights: readonly (readonly [string, number])[]): (rea
 }
 
 /** Wind triangles outwards (by signed volume about the centroid) and make the normals agree. */
-function orientOutward({ positions, normals, indices }: SurfaceMesh, facesInward: boolean): void {
+export function orientOutward({ positions, normals, indices }: SurfaceMesh, facesInward: boolean): void {
   const centre = new Vector3();
   for (let i = 0; i < positions.length; i += 3) centre.add(new Vector3().fromArray(positions, i));
   centre.divideScalar(positions.length / 3);

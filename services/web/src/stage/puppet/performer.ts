@@ -33,6 +33,11 @@ export interface Performer {
   invalidate?(): void;
   /** Write the world position of a limb's handle into `out` (0 left hand, 1 right hand, 2 left knee, 3 right knee). */
   handle(limb: number, out: Vector3): Vector3;
+  /**
+   * Write the world matrix of a hand as drawn into `out` (0 left, 1 right): the axes of its joint, which are those of
+   * the stage while the figure is at rest, at a share of the way from the wrist to the tip.
+   */
+  hand(limb: number, share: number, out: Matrix4): Matrix4;
   /** Return the world matrix of a joint of the streamed figure. */
   joint(name: string): Matrix4;
   /** Write into `out` the world position of the streamed figure's handle that moves this performer's handle to `to`. */

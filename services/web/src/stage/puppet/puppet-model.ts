@@ -10,7 +10,7 @@ import { FINGER_BONES, wristOf } from "./hand/finger-joints";
 import { Puppet, setPuppetExtension } from "./puppet";
 import { PuppetAssets } from "./puppet-assets";
 import { PuppetExtension } from "./puppet-extension";
-import { SIDES } from "./standard-figure";
+import { SIDES, SOLE_HEIGHT_M } from "./standard-figure";
 import { createFaceTexture } from "./texture";
 
 /** Minimum z of a triangle's normals for it to carry the face paint. */
@@ -56,6 +56,7 @@ export function createPuppetModel(figure: Figure): PuppetModel {
     weights: Float32Array.from(values("skinWeight")),
     face: Uint32Array.from(face),
     body: Uint32Array.from(body),
+    soleHeight: SOLE_HEIGHT_M * puppet.scale,
     separateHead() {
       const isHead = (_: number, at: number) => ofHead(body[at - (at % 3)]);
       const back = body.filter(isHead);

@@ -14,7 +14,7 @@ import {
   type WebGLRenderer,
 } from "three";
 import type { StagedPose } from "../../motion/extension";
-import { type Figure, JOINTS, PARENTS } from "../../motion/skeleton";
+import { type Figure, JOINTS, PARENTS, TIP_JOINTS } from "../../motion/skeleton";
 import { STANDING_HEIGHT_M } from "../camera/audience-camera";
 import type { Look } from "../scenery/look";
 import { BONES, FACE_BONE, TRUNK_BONES } from "./bones";
@@ -164,6 +164,13 @@ export class Puppet implements Performer {
 
   handle(limb: number, out: Vector3): Vector3 {
     return handlePosition({ joint: (name) => this.#bone(name).matrixWorld, scale: this.scale }, limb, out);
+  }
+
+  hand(limb: number, share: number, out: Matrix4): Matrix4 {
+    const joint = TIP_JOINTS[limb + 1];
+    const tip = new Vector3().fromArray(this.figure.tips, joint * 3).multiplyScalar(share);
+    out.copy(this.#bones[joint].matrixWorld);
+    return out.setPosition(tip.applyMatrix4(out));
   }
 
   readonly joint = (name: string): Matrix4 => this.#extension?.streamedJoint(name) ?? this.#bone(name).matrixWorld;

@@ -1,3 +1,4 @@
 /** Controls of the strings panel that are loaded when it opens. */
 export { createCameraButton } from "./camera-button";
 export { createDirectionPad } from "./direction-pad";
+export { createPropSection } from "./prop-section";

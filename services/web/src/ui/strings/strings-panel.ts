@@ -2,6 +2,7 @@
 import { translate, translateToParts } from "../../i18n/translator";
 import type { DigitalInput } from "../../input/digital-input";
 import { isHand, limbNumber } from "../../wire/limbs";
+import type { PropPresence } from "../../wire/messages";
 import { element, setAttribute, setText } from "../dom";
 import { limbIcon } from "../icon";
 import {
@@ -16,6 +17,7 @@ import {
 import { createPanel, type Panel } from "../panel";
 import type { DirectionPad } from "./direction-pad";
 import { createNextPerformerButton, createPerformerChooser } from "./performer-chooser";
+import type { PropActions, PropSection } from "./prop-section";
 
 const NOTICE_DURATION_MS = 5_000;
 
@@ -23,6 +25,8 @@ export interface StringsPanel {
   readonly panel: Panel;
   /** Show the limbs of the `selected` performer, of all performers' limbs. Unless `ready`, no limb can be claimed. */
   render(limbs: readonly LimbState[], ready: boolean, selected?: number): void;
+  /** Show the props of the session. */
+  renderProps(props: readonly PropPresence[]): void;
   readonly dock: HTMLElement;
   /** Show a short message about an input that was not applied as sent. */
   notice(text: string): void;
@@ -48,6 +52,8 @@ export interface StringsActions {
    * Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded.
    */
   useCamera(onChange: (isOn: boolean) => void): Promise<void>;
+  /** Omitted if this page may not change the session. */
+  props?: PropActions;
 }
 
 /** Action of a limb's button. */
@@ -155,6 +161,11 @@ export function createStringsPanel(
     translate("Join hands"),
   );
   let loading: Promise<unknown> | null = null;
+  /** Null while it is not loaded, and if this page may not change the session. */
+  let propSection: PropSection | null = null;
+  let props: readonly PropPresence[] = [];
+  let isReady = false;
+  const renderProps = () => propSection?.render(props, performers, isReady);
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
   panel.body.append(
@@ -178,9 +189,13 @@ export function createStringsPanel(
     dock,
     load() {
       loading ??= import("./strings-controls").then(
-        ({ createCameraButton, createDirectionPad }) => {
+        ({ createCameraButton, createDirectionPad, createPropSection }) => {
           for (const { limb, setPad } of rows) setPad(createDirectionPad(limb, actions.press));
           keys.before(createCameraButton(actions.useCamera));
+          if (!actions.props) return;
+          propSection = createPropSection(actions.props);
+          panel.body.append(propSection.element);
+          renderProps();
         },
         () => (loading = null),
       );
@@ -194,8 +209,14 @@ export function createStringsPanel(
         hint.hidden = false;
       }, NOTICE_DURATION_MS);
     },
+    renderProps(shown) {
+      props = shown;
+      renderProps();
+    },
     render(limbs, ready, selected = 0) {
       [performer, performers] = [selected, performerCount(limbs)];
+      isReady = ready;
+      renderProps();
       for (const part of [chooser, next]) part.render(limbs, selected);
       for (const { limb, render } of rows) render(limbs[limbOf(limb)], ready);
       // Only with a hand of one's own, so that the sheet of a phone leaves room for the performer's feet.

@@ -24,6 +24,9 @@ class FakePerformer implements Performer {
   handle(_: number, out: Vector3): Vector3 {
     return out;
   }
+  hand(_limb: number, _share: number, out: Matrix4): Matrix4 {
+    return out;
+  }
   joint(): Matrix4 {
     return this.root;
   }

@@ -36,6 +36,23 @@ describe("the floor under a performer", () => {
   });
 });
 
+describe("hands of the puppet", () => {
+  test("have the axes of their joints, and points between wrist and tip", () => {
+    for (const [limb, name] of ["l_wrist", "r_wrist"].entries()) {
+      const puppet = createStandingPuppet(0.5);
+      const wrist = puppet.joint(name);
+      const [start, tip] = [0, 1].map((share) => puppet.hand(limb, share, new Matrix4()));
+      expect(start.elements).toEqual(wrist.elements);
+      const along = new Vector3().setFromMatrixPosition(tip).sub(new Vector3().setFromMatrixPosition(wrist));
+      expect(along.y).toBeLessThan(-0.15);
+      const axes = new Matrix4().extractRotation(tip);
+      axes.elements.forEach((value, at) =>
+        expect(value).toBeCloseTo(new Matrix4().extractRotation(wrist).elements[at], 9),
+      );
+    }
+  });
+});
+
 describe("handles of a performer", () => {
   test("are below the wrists, mirrored, and rotate with them", () => {
     const [left, right] = [0, 1].map((limb) => handlePosition(standingWith({}), limb, new Vector3()));

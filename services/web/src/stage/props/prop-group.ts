@@ -1,0 +1,201 @@
+/**
+ * Props on the stage: in the hands of the performers, or on the floor. A prop that is taken, passed or laid down moves
+ * there within a short time. Loaded with the first prop.
+ */
+import {
+  BufferGeometry,
+  type Camera,
+  Float32BufferAttribute,
+  Group,
+  type Material,
+  Matrix4,
+  Mesh,
+  Quaternion,
+  Sphere,
+  Vector3,
+} from "three";
+import { PropMovement } from "../../motion/prop-movement";
+import {
+  createPropTransform,
+  GRIP_SHARE,
+  heldTransform,
+  isPropKind,
+  laidTransform,
+  type PropKind,
+  type PropTransform,
+} from "../../motion/props";
+import { limbWithinPerformer, performerOfLimb } from "../../wire/limbs";
+import type { PropPresence } from "../../wire/messages";
+import type { ScreenBox } from "../camera/screen-box";
+import type { ScreenProjection } from "../camera/screen-projection";
+import type { Performer } from "../puppet/performer";
+import { createPropMaterial, SimplePropMaterial } from "./prop-material";
+import { createPropShape } from "./prop-shape";
+
+/** Factor of a prop's radius for its near side, which is larger in the picture. */
+const NEARNESS = 1.15;
+/** Largest share of a picture's half height that props in hands take before the camera moves back. */
+const TOP_SHARE = 0.8;
+
+/** A prop that is drawn. */
+interface DrawnProp {
+  readonly mesh: Mesh<BufferGeometry, Material>;
+  readonly movement: PropMovement;
+  isHeld: boolean;
+}
+
+export class PropGroup {
+  readonly group = new Group();
+  readonly #props = new Map<string, DrawnProp>();
+  readonly #geometries = new Map<PropKind, BufferGeometry>();
+  readonly #material = createPropMaterial();
+  readonly #simpleMaterial = new SimplePropMaterial();
+  #usesSimpleMaterials = false;
+
+  constructor() {
+    this.group.name = "props";
+  }
+
+  set usesSimpleMaterials(on: boolean) {
+    this.#usesSimpleMaterials = on;
+    for (const { mesh } of this.#props.values()) mesh.material = this.#currentMaterial;
+  }
+
+  /**
+   * Show the props that there are now, with the performers in their poses and the floor at `floorHeight`, `seconds`
+   * after the last call; with Infinity nothing eases. Props of unknown kinds, and those whose performer is not seen,
+   * are not drawn. Return true if a kind is drawn for the first time: its shader is to be compiled.
+   */
+  update(
+    props: readonly PropPresence[],
+    performers: readonly Performer[],
+    floorHeight: number,
+    seconds: number,
+  ): boolean {
+    const kinds = this.#geometries.size;
+    const shown = new Set<string>();
+    for (const prop of props) {
+      const { kind } = prop;
+      if (!isPropKind(kind)) continue;
+      const key = `${prop.prop} ${kind}`;
+      shown.add(key);
+      const drawn = this.#props.get(key) ?? this.#add(key, kind);
+      const place = transformOf(prop, kind, performers, floorHeight);
+      drawn.mesh.visible = place !== null;
+      drawn.isHeld = prop.limb !== null;
+      if (place) moveMesh(drawn.mesh, drawn.movement.moveTo(place, prop, seconds));
+      else drawn.movement.hide();
+    }
+    for (const [key, { mesh }] of this.#props)
+      if (!shown.has(key)) {
+        mesh.removeFromParent();
+        this.#props.delete(key);
+      }
+    return this.#geometries.size > kinds;
+  }
+
+  /** Return the boxes of the props in the picture, in CSS pixels. */
+  boxes(projection: ScreenProjection): ScreenBox[] {
+    return this.#visible.map(({ mesh }) => {
+      const { center, radius } = sphereOf(mesh);
+      return projection.boxAt(center, { across: radius, up: radius, down: radius }, NEARNESS);
+    });
+  }
+
+  /** Return how far the props in hands reach from the centre of the picture (0) to its edges (1). */
+  reach(camera: Camera): number {
+    const right = new Vector3().setFromMatrixColumn(camera.matrixWorld, 0);
+    const up = new Vector3().setFromMatrixColumn(camera.matrixWorld, 1);
+    const shares = this.#visible.flatMap(({ mesh, isHeld }) => {
+      if (!isHeld) return [];
+      const { center, radius } = sphereOf(mesh);
+      const project = (direction: Vector3, sign: number) =>
+        center
+          .clone()
+          .addScaledVector(direction, sign * radius)
+          .project(camera);
+      return [Math.abs(project(right, 1).x), Math.abs(project(right, -1).x), project(up, 1).y * TOP_SHARE];
+    });
+    return Math.max(0, ...shares);
+  }
+
+  dispose(): void {
+    for (const geometry of this.#geometries.values()) geometry.dispose();
+    for (const material of [this.#material, this.#simpleMaterial]) material.dispose();
+    this.group.removeFromParent();
+  }
+
+  get #visible(): DrawnProp[] {
+    return [...this.#props.values()].filter(({ mesh }) => mesh.visible);
+  }
+
+  get #currentMaterial(): Material {
+    return this.#usesSimpleMaterials ? this.#simpleMaterial : this.#material;
+  }
+
+  #add(key: string, kind: PropKind): DrawnProp {
+    const mesh = new Mesh<BufferGeometry, Material>(this.#geometryFor(kind), this.#currentMaterial);
+    mesh.name = kind;
+    mesh.castShadow = true;
+    mesh.receiveShadow = true;
+    mesh.matrixAutoUpdate = false;
+    mesh.onBeforeRender = (_renderer, scene, _camera, _geometry, material) => {
+      if (material instanceof SimplePropMaterial) material.prepare(scene);
+    };
+    this.group.add(mesh);
+    const drawn = { mesh, movement: new PropMovement(), isHeld: false };
+    this.#props.set(key, drawn);
+    return drawn;
+  }
+
+  #geometryFor(kind: PropKind): BufferGeometry {
+    const known = this.#geometries.get(kind);
+    if (known) return known;
+    const { positions, normals, colours, finishes, indices } = createPropShape(kind);
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
+    geometry.setAttribute("normal", new Float32BufferAttribute(normals, 3));
+    geometry.setAttribute("color", new Float32BufferAttribute(colours, 3));
+    geometry.setAttribute("finish", new Float32BufferAttribute(finishes, 3));
+    geometry.setIndex(indices);
+    geometry.computeBoundingSphere();
+    this.#geometries.set(kind, geometry);
+    return geometry;
+  }
+}
+
+/** Return where a prop belongs, null if its performer is not seen. The next call reuses the storage. */
+function transformOf(
+  { limb, place }: PropPresence,
+  kind: PropKind,
+  performers: readonly Performer[],
+  floorHeight: number,
+): PropTransform | null {
+  if (limb === null) return laidTransform(kind, place, floorHeight, transform);
+  const performer = performers[performerOfLimb(limb)];
+  if (!performer?.group.visible) return null;
+  const hand = limbWithinPerformer(limb);
+  performer.hand(hand, GRIP_SHARE, matrix);
+  position.setFromMatrixPosition(matrix).toArray(grip.position);
+  const { x, y, z, w } = rotation.setFromRotationMatrix(matrix);
+  grip.rotation.set([w, x, y, z]);
+  return heldTransform(kind, hand, grip, transform);
+}
+
+function moveMesh(mesh: Mesh, place: PropTransform): void {
+  const [w, x, y, z] = place.rotation;
+  mesh.matrix.compose(position.fromArray(place.position), rotation.set(x, y, z, w), ONE);
+  mesh.matrixWorldNeedsUpdate = true;
+}
+
+function sphereOf({ geometry, matrix: place }: Mesh<BufferGeometry, Material>): Sphere {
+  return sphere.copy(geometry.boundingSphere ?? new Sphere()).applyMatrix4(place);
+}
+
+const ONE = new Vector3(1, 1, 1);
+const transform = createPropTransform();
+const grip = createPropTransform();
+const matrix = new Matrix4();
+const position = new Vector3();
+const rotation = new Quaternion();
+const sphere = new Sphere();
