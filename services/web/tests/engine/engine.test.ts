@@ -175,6 +175,7 @@ test("the state of the limbs is sent when it changes, and with a mapping, whose 
       live: null,
       bonds: null,
       crowd: null,
+      props: null,
       viewers,
       puppeteers: PEOPLE,
       limbs: [null, holder, null, null],
