@@ -24,6 +24,7 @@ from bunraku.wire.messages import (
     Choice,
     Claim,
     CrowdPulls,
+    CrowdTurn,
     Data,
     Description,
     Edit,
@@ -167,6 +168,8 @@ def make_vectors() -> dict[str, Any]:
         Pull(1, [0.5, -0.25, 0.125]),
         CrowdPulls(1, 9_000, [[0.5, -0.25, 0.125], [-0.75, 0.25, 0.375]]),
         CrowdPulls(6, 0, []),
+        CrowdPulls(6, 3, [[0.5, -0.25, 0.125]], [2, 0, 1, 0]),
+        CrowdTurn(1, True),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     live = Live(NOW_US, 2, {0: LiveBlock(8_000, b"ab"), 1: LiveBlock(4_000, b"c")}).pack()

@@ -272,6 +272,19 @@ class CrowdPulls(_MapMessage):
     limb: LimbNumber
     count: Annotated[SafeInteger, Field(description="Number of members who pull.")]
     places: Annotated[list[Place], Field(max_length=MAX_SHOWN_PULLS, description="Targets of some of them.")]
+    votes: Annotated[
+        list[SafeInteger] | None,
+        Field(min_length=1, description="Votes for each gesture of the limb; absent: the policy is not `vote`."),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class CrowdTurn(_MapMessage):
+    """Begin or end of this viewer's turn to move a limb that is open to the crowd."""
+
+    TYPE = 18
+    limb: LimbNumber
+    yours: Annotated[Flag, Field(description="True: the limb follows this viewer's pull.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -464,15 +477,15 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant | Refusal
-    | Notice | BondEnd | CrowdPulls | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask | Bond | Pull
-    | Input | Sample
+    | Notice | BondEnd | CrowdPulls | CrowdTurn | Choice | Live | Ping | Edit | Report | Claim | Release | Alive | Ask
+    | Bond | Pull | Input | Sample
 )  # fmt: skip
 
 FIXED_MESSAGES = (Data, Overlay, Live, Ping, Pong, Input, Sample)
 """Messages of fixed layout."""
 MAP_MESSAGES = (
     ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, BondEnd,
-    CrowdPulls, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull,
+    CrowdPulls, CrowdTurn, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull,
 )  # fmt: skip
 """Messages that are a MessagePack map."""
 

@@ -174,6 +174,17 @@ export interface CrowdPulls {
   count: number;
   /** Targets of some of them. */
   places: number[][];
+  /** Votes for each gesture of the limb; absent: the policy is not `vote`. */
+  votes: number[] | null;
+}
+
+/** Begin or end of this viewer's turn to move a limb that is open to the crowd. */
+export interface CrowdTurn {
+  name: "CrowdTurn";
+  /** Limb l of performer k has number 4 k + l. */
+  limb: number;
+  /** True: the limb follows this viewer's pull. */
+  yours: boolean;
 }
 
 /** Clock request. It has the size of the answer, so that both directions take equally long to transmit. */
@@ -306,7 +317,8 @@ export type ServerMessage =
   | Choice
   | Live
   | BondEnd
-  | CrowdPulls;
+  | CrowdPulls
+  | CrowdTurn;
 
 export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond | Pull;
 
@@ -330,6 +342,7 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   Live: LIVE_TYPE,
   BondEnd: 16,
   CrowdPulls: 17,
+  CrowdTurn: 18,
   Ping: 64,
   Edit: 65,
   Report: 66,
