@@ -262,6 +262,8 @@ export const JAPANESE_PAGE_MESSAGES = {
   You: "あなた",
   Someone: "ゲスト",
   "The audience": "観客",
+  "With this link you pull only what is open to the audience":
+    "このリンクでは、観客に開かれた手足だけを動かせます",
   "Take a string": "糸を持つ",
   Dancer: "踊り手",
   "Dancer {number}": "踊り手{number}",

@@ -44,7 +44,7 @@ beforeEach(() => {
     get viewOnly() {
       return viewOnly;
     },
-    isFree: () => true,
+    canPull: () => true,
     limbStates: () => [],
     selectedPerformer: new PerformerSelection(),
   };

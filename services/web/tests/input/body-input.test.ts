@@ -33,7 +33,7 @@ class Stage {
           if (this.othersLimbs.has(limb)) this.refused.push(limb);
           return !this.othersLimbs.has(limb) && this.limbs.claim(limb, source);
         },
-        isFree: (limb) => !this.othersLimbs.has(limb) && this.limbs.source(limb) === null,
+        canPull: (limb) => !this.othersLimbs.has(limb) && this.limbs.source(limb) === null,
         selectedPerformer: this.selection,
       },
       { performers: this.puppets, back: () => new Vector3(0, 0, this.isFacing ? 1 : -1) },
