@@ -1,7 +1,7 @@
 /** Actions of the page's controls and of its keys, as functions of the application's parts. */
 
 import { pageAccess } from "../client/access";
-import { recordSession } from "../client/api";
+import { editSession, recordSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
@@ -93,6 +93,14 @@ export function createUserActions(app: AppParts): UserActions {
     reframe: () => app.stageHost.resize(),
     labels: (metrics) => app.stageHost.setLabels(metrics),
     mappingShown: () => app.stageHost.pollGamepad(),
+    ...(pageAccess.allows("control")
+      ? {
+          openLimbs: (crowd) => {
+            const { current } = app.playback;
+            if (current) editSession(current.id, { crowd }).catch((error) => reportFailure(app.page, error));
+          },
+        }
+      : {}),
     ...(pageAccess.allows("ingest")
       ? {
           keep: createPageRecordAction(app),
@@ -132,6 +140,11 @@ export function createKeyActions(app: AppParts): PageActions {
     strings: () => app.page.panels.toggle("strings"),
     line: () => app.page.panels.toggle("line"),
   };
+}
+
+function reportFailure(page: Page, error: unknown): void {
+  if (!(error instanceof ProblemError)) throw error;
+  page.toast(translate("{title}: {detail}", error));
 }
 
 /** Load the last avatar file of these, and upload all motion files if this page may. */

@@ -1,3 +1,4 @@
 /** Controls of the strings panel that are loaded when it opens. */
+export { createCrowdControls } from "../crowd/crowd-controls";
 export { createCameraButton } from "./camera-button";
 export { createDirectionPad } from "./direction-pad";

@@ -2,15 +2,20 @@
 import { translate, translateToParts } from "../../i18n/translator";
 import type { DigitalInput } from "../../input/digital-input";
 import { isHand, limbNumber } from "../../wire/limbs";
+import type { CrowdControls, CrowdEdit } from "../crowd/crowd-controls";
 import { element, setAttribute, setText } from "../dom";
 import { limbIcon } from "../icon";
 import {
+  holderColour,
+  isPulledHere,
   LIMB_NAMES,
   LIMB_ORDER,
   type LimbHolder,
   type LimbState,
+  limbButtonName,
   limbKey,
   limbName,
+  openCrowd,
   performerCount,
 } from "../limb-state";
 import { createPanel, type Panel } from "../panel";
@@ -48,6 +53,8 @@ export interface StringsActions {
    * Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded.
    */
   useCamera(onChange: (isOn: boolean) => void): Promise<void>;
+  /** Open limbs to the audience, and close them. Omitted if this page may not. */
+  openLimbs?(edit: CrowdEdit): void;
 }
 
 /** Action of a limb's button. */
@@ -56,7 +63,7 @@ type LimbAction = "toggle" | "ask" | "withdraw" | "give";
 /** Create panel and dock in `root`. */
 export function createStringsPanel(
   root: HTMLElement,
-  actions: StringsActions & { close(): void; keys(): void },
+  actions: StringsActions & { close(): void; keys(): void; share(): void },
 ): StringsPanel {
   const panel = createPanel(root, "strings", translate("Strings"), actions.close);
   /** Selected performer, and the number of performers. */
@@ -98,15 +105,19 @@ export function createStringsPanel(
     };
     const render = (limbState: LimbState, ready: boolean) => {
       const { holder, selected } = limbState;
-      const mine = holder?.mine ?? false;
+      const crowd = openCrowd(limbState);
+      const mine = isPulledHere(limbState);
       setAttribute(row, "style", holderStyle(holder));
       const name = { limb: limbName(limbOf(limb), performers) };
       setText(state, limbStatus(limbState));
-      if (!holder)
+      if (!holder || crowd)
         state.append(element("span", { class: "key-hint" }, translate(", key {key}", { key: limbKey(limb) })));
       action = limbAction(limbState);
-      const label =
-        action === "toggle"
+      const label = crowd
+        ? mine
+          ? "Let go"
+          : "Pull"
+        : action === "toggle"
           ? holder
             ? "Release"
             : "Take"
@@ -155,6 +166,8 @@ export function createStringsPanel(
     translate("Join hands"),
   );
   let loading: Promise<unknown> | null = null;
+  let crowdControls: CrowdControls | null = null;
+  let renderControls = () => {};
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
   panel.body.append(
@@ -178,9 +191,13 @@ export function createStringsPanel(
     dock,
     load() {
       loading ??= import("./strings-controls").then(
-        ({ createCameraButton, createDirectionPad }) => {
+        ({ createCameraButton, createCrowdControls, createDirectionPad }) => {
           for (const { limb, setPad } of rows) setPad(createDirectionPad(limb, actions.press));
           keys.before(createCameraButton(actions.useCamera));
+          if (!actions.openLimbs) return;
+          crowdControls = createCrowdControls(actions.openLimbs, actions.share);
+          panel.body.append(crowdControls.element);
+          renderControls();
         },
         () => (loading = null),
       );
@@ -198,25 +215,16 @@ export function createStringsPanel(
       [performer, performers] = [selected, performerCount(limbs)];
       for (const part of [chooser, next]) part.render(limbs, selected);
       for (const { limb, render } of rows) render(limbs[limbOf(limb)], ready);
+      renderControls = () => crowdControls?.render(limbs, ready, selected);
+      renderControls();
       // Only with a hand of one's own, so that the sheet of a phone leaves room for the performer's feet.
       join.hidden = !ready || !limbs.some(({ holder }, limb) => holder?.mine && isHand(limb));
       for (const { limb, disc, name } of discs) {
-        const { holder, requestedByMe } = limbs[limbOf(limb)];
-        const lowerName = limbName(limbOf(limb), performers);
-        const capitalName = lowerName.charAt(0).toUpperCase() + lowerName.slice(1);
+        const state = limbs[limbOf(limb)];
+        const { holder } = state;
         setAttribute(disc, "style", holderStyle(holder));
-        setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute(
-          "aria-label",
-          !holder
-            ? translate("Take the {limb}", { limb: lowerName })
-            : holder.mine
-              ? translate("Release the {limb}, held by you", { limb: lowerName })
-              : translate(requestedByMe ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", {
-                  limb: capitalName,
-                  name: holder.name,
-                }),
-        );
+        setAttribute(disc, "data-mine", isPulledHere(state));
+        disc.setAttribute("aria-label", limbButtonName(state, limbName(limbOf(limb), performers)));
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");
@@ -231,19 +239,25 @@ const ACTION_LABELS = {
   Give: "Give {limb}",
   Ask: "Ask for {limb}",
   Withdraw: "Withdraw the request for {limb}",
+  Pull: "Pull {limb}",
+  "Let go": "Let go of {limb}",
 } as const;
 
 function holderStyle(holder: LimbHolder | null): string | null {
-  return holder ? `--colour: var(--holder-${holder.colour})` : null;
+  return holder ? `--colour: ${holderColour(holder)}` : null;
 }
 
-function limbAction({ holder, requesters, requestedByMe }: LimbState): LimbAction {
-  if (!holder) return "toggle";
+function limbAction(state: LimbState): LimbAction {
+  const { holder, requesters, requestedByMe } = state;
+  if (!holder || openCrowd(state)) return "toggle";
   if (holder.mine) return requesters.length > 0 ? "give" : "toggle";
   return requestedByMe ? "withdraw" : "ask";
 }
 
-function limbStatus({ holder, requesters, requestedByMe }: LimbState): string {
+function limbStatus(state: LimbState): string {
+  const { holder, requesters, requestedByMe } = state;
+  const crowd = openCrowd(state);
+  if (crowd) return crowd.isPulled ? translate("You pull this") : translate("Open to the audience");
   if (!holder) return translate("Free");
   if (holder.mine)
     return requesters.length > 0
