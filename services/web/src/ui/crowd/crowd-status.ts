@@ -35,15 +35,14 @@ export function createCrowdStatus(
   const more = element("small");
   // Not a live region: the numbers change all the time.
   const status = element(
-    "div",
-    { class: "crowd-status", role: "group", "aria-label": translate("The audience"), hidden: true },
+    "section",
+    { class: "crowd-status", "aria-label": translate("The audience"), hidden: true },
     ...rows.map((row) => row.root),
     more,
   );
   const announcement = element("p", { class: "sr-only", role: "status", "aria-live": "polite" });
   root.prepend(element("div", {}, status, announcement));
-  /** Open limbs; null before the first are known. */
-  let known: ReadonlySet<number> | null = null;
+  let known: ReadonlySet<number> = new Set();
   let shown: readonly OpenLimb[] = [];
   let performers = 1;
   let timer: ReturnType<typeof setInterval> | undefined;
@@ -68,10 +67,8 @@ export function createCrowdStatus(
       text: "The {limb} is open to the audience" | "The {limb} is closed to the audience",
       limb: number,
     ) => toast(translate(text, { limb: limbName(limb, performers) }));
-    if (known) {
-      for (const limb of open) if (!known.has(limb)) report("The {limb} is open to the audience", limb);
-      for (const limb of known) if (!open.has(limb)) report("The {limb} is closed to the audience", limb);
-    }
+    for (const limb of open) if (!known.has(limb)) report("The {limb} is open to the audience", limb);
+    for (const limb of known) if (!open.has(limb)) report("The {limb} is closed to the audience", limb);
     known = open;
     const turn = limbs.findIndex(({ crowd }) => crowd?.hasTurn && crowd.isPulled);
     setText(announcement, turn < 0 ? "" : translate("It is your turn: {limb}", { limb: limbName(turn, performers) }));

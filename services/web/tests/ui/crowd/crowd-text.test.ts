@@ -1,6 +1,12 @@
 import { describe, expect, test } from "vitest";
 import { JAPANESE_PAGE_MESSAGES } from "../../../src/i18n/japanese";
-import { describePolicy, describePulls, POLICY_EFFECTS, POLICY_NAMES, secondsOfTurn } from "../../../src/ui/crowd/crowd-text";
+import {
+  describePolicy,
+  describePulls,
+  POLICY_EFFECTS,
+  POLICY_NAMES,
+  secondsOfTurn,
+} from "../../../src/ui/crowd/crowd-text";
 import type { LimbCrowd } from "../../../src/ui/limb-state";
 
 const [LEFT_HAND, LEFT_LEG] = [0, 2];
