@@ -295,7 +295,7 @@ export const JAPANESE_PAGE_MESSAGES = {
     "ほかの人の番です。あと{seconds}秒。引き続けて待ってください",
   "One at a time, next turn in {seconds} s": "一人ずつ交代。次の番まで{seconds}秒",
   "The gesture with the most votes wins": "いちばん多くの人が引くしぐさになります",
-  "{gesture}: {count}": "{gesture}：{count}",
+  "Votes: {votes}": "投票：{votes}",
   "to the side": "横",
   "to the front": "前",
   "to the back": "後ろ",

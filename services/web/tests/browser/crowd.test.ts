@@ -83,7 +83,7 @@ describeInBrowser("crowd", { server: "open" }, (fixture) => {
       )
       .toBe(1);
     await policy.selectOption("Vote between gestures");
-    await expect.poll(() => readStatus(host)).toMatch(/pull.*(up|down|across|to the (side|front)): [12]/);
+    await expect.poll(() => readStatus(host)).toMatch(/pull.*Votes: (up|down|across|to the (side|front)) [12]/);
 
     await waitForToast(phone, "The left hand is closed to the audience", () => limbButton(host, "Left hand").click());
     for (const page of [phone, keys]) {

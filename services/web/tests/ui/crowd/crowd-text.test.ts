@@ -44,7 +44,7 @@ describe("policy", () => {
     ["others pull in turns", turns, "One at a time, next turn in 4 s"],
     ["median", { pulls: 3 }, ""],
     ["votes are not known", { policy: "vote", pulls: 3 }, "The gesture with the most votes wins"],
-    ["votes", { policy: "vote", pulls: 9, votes: [0, 3, 0, 0, 6] }, "across: 6, to the side: 3"],
+    ["votes", { policy: "vote", pulls: 9, votes: [0, 3, 0, 0, 6] }, "Votes: across 6, to the side 3"],
     ["policy of a later release", { policy: "lottery", pulls: 3 }, ""],
   ])("%s", (_, changes, text) => {
     expect(describePolicy(LEFT_HAND, crowdOf(changes), 4)).toBe(text);
@@ -52,7 +52,7 @@ describe("policy", () => {
 
   test("legs have gestures of their own", () => {
     const crowd = crowdOf({ policy: "vote", pulls: 4, votes: [1, 0, 0, 3] });
-    expect(describePolicy(LEFT_LEG, crowd, 1)).toBe("to the back: 3, up: 1");
+    expect(describePolicy(LEFT_LEG, crowd, 1)).toBe("Votes: to the back 3, up 1");
   });
 
   test("every name and effect is translated", () => {
