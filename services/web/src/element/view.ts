@@ -3,17 +3,8 @@ import type { Translator } from "../i18n/translator";
 import tokens from "../style/tokens.css?inline";
 import { element, setAttribute } from "../ui/dom";
 import { icon, limbIcon } from "../ui/icon";
-import {
-  capitalise,
-  holderColour,
-  isPulledHere,
-  LIMB_ORDER,
-  type LimbState,
-  limbButtonName,
-  limbKey,
-  limbName,
-  performerCount,
-} from "../ui/limb-state";
+import { capitalise, holderColour, isPulledHere, limbButtonName } from "../ui/limb-display";
+import { LIMB_ORDER, type LimbState, limbKey, limbName, performerCount } from "../ui/limb-state";
 import { createToast, type ToastController } from "../ui/notification/toast";
 import { type LabelAnchors, LabelLayout } from "../ui/strings/label-layout";
 import { createLimbRequests, type LimbRequests } from "../ui/strings/limb-request";

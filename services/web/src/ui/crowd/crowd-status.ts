@@ -1,7 +1,8 @@
 /** Status of the limbs that are open to the audience, for everybody who watches. Loaded with the first of them. */
 import { translate } from "../../i18n/translator";
 import { element, setText } from "../dom";
-import { capitalise, type LimbCrowd, type LimbState, limbName, openCrowd, performerCount } from "../limb-state";
+import { capitalise, openCrowd } from "../limb-display";
+import { type LimbCrowd, type LimbState, limbName, performerCount } from "../limb-state";
 import { describePolicy, describePulls, secondsOfTurn } from "./crowd-text";
 
 /** Most limbs with a row each. */
@@ -30,7 +31,7 @@ export function createCrowdStatus(
 ): CrowdStatus {
   const rows = Array.from({ length: MAX_ROWS }, () => {
     const [name, pulls, policy] = [element("b"), element("span"), element("small")];
-    return { name, pulls, policy, root: element("p", {}, name, " ", pulls, policy) };
+    return { name, pulls, policy, root: element("p", {}, name, pulls, policy) };
   });
   const more = element("small");
   // Not a live region: the numbers change all the time.
@@ -53,7 +54,7 @@ export function createCrowdStatus(
       row.root.hidden = !open;
       if (!open) return;
       setText(row.name, capitalise(limbName(open.limb, performers)));
-      setText(row.pulls, describePulls(open.crowd));
+      setText(row.pulls, ` ${describePulls(open.crowd)}`);
       setText(row.policy, describePolicy(open.limb, open.crowd, seconds));
     });
     const count = shown.length - MAX_ROWS;

@@ -74,6 +74,6 @@ function describeVotes(
     .filter(({ count }) => count > 0)
     .sort((a, b) => b.count - a.count);
   if (counted.length === 0) return translate("The gesture with the most votes wins");
-  const votes = counted.map(({ gesture, count }) => `${translate(gesture)} ${count}`).join(translate(", "));
-  return translate("Votes: {votes}", { votes });
+  const results = counted.map(({ gesture, count }) => `${translate(gesture)} ${count}`);
+  return translate("Votes: {votes}", { votes: results.join(translate(", ")) });
 }

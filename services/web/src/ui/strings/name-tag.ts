@@ -5,7 +5,8 @@ import type { ScreenBox } from "../../stage/camera/screen-box";
 import { CROWD, MAX_LIMBS } from "../../wire/limbs";
 import { element, setAttribute, setText } from "../dom";
 import { initialOf } from "../format";
-import { holderColour, type LimbHolder, type LimbState, limbName } from "../limb-state";
+import { holderColour } from "../limb-display";
+import { type LimbHolder, type LimbState, limbName } from "../limb-state";
 import type { LabelMetrics, LabelPosition, LabelPositions } from "./label-layout";
 import type { Size } from "./tag-layout";
 

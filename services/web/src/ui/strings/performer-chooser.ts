@@ -4,7 +4,8 @@
 import { joinList, pageTranslator, translate } from "../../i18n/translator";
 import { limbNumber } from "../../wire/limbs";
 import { element, setAttribute } from "../dom";
-import { holderColour, LIMB_NAMES, LIMB_ORDER, type LimbState, performerCount } from "../limb-state";
+import { holderColour } from "../limb-display";
+import { LIMB_NAMES, LIMB_ORDER, type LimbState, performerCount } from "../limb-state";
 
 export interface PerformerChooser {
   readonly element: HTMLElement;

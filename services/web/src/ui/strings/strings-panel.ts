@@ -5,17 +5,14 @@ import { isHand, limbNumber } from "../../wire/limbs";
 import type { CrowdControls, CrowdEdit } from "../crowd/crowd-controls";
 import { element, setAttribute, setText } from "../dom";
 import { limbIcon } from "../icon";
+import { holderColour, isPulledHere, limbButtonName, openCrowd } from "../limb-display";
 import {
-  holderColour,
-  isPulledHere,
   LIMB_NAMES,
   LIMB_ORDER,
   type LimbHolder,
   type LimbState,
-  limbButtonName,
   limbKey,
   limbName,
-  openCrowd,
   performerCount,
 } from "../limb-state";
 import { createPanel, type Panel } from "../panel";
