@@ -7,6 +7,7 @@ import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
+import type { CrowdActions } from "../ui/crowd/crowd-controls";
 import type { EditActions } from "../ui/library/motion-editor";
 import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem } from "../ui/library/problem-report";
@@ -23,7 +24,7 @@ import { createEditedMotion } from "./motion-edit";
 import type { PlaybackController } from "./playback-controller";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
-import { copyShareLink } from "./share-link";
+import { copyShareLink, createShareLink } from "./share-link";
 import type { SoundController } from "./sound-controller";
 import type { StageHost } from "./stage-host";
 import type { UploadTarget } from "./upload-controller";
@@ -95,10 +96,7 @@ export function createUserActions(app: AppParts): UserActions {
     mappingShown: () => app.stageHost.pollGamepad(),
     ...(pageAccess.allows("control")
       ? {
-          openLimbs: (crowd) => {
-            const { current } = app.playback;
-            if (current) editSession(current.id, { crowd }).catch((error) => reportFailure(app.page, error));
-          },
+          crowd: createCrowdActions(app),
         }
       : {}),
     ...(pageAccess.allows("ingest")
@@ -142,9 +140,21 @@ export function createKeyActions(app: AppParts): PageActions {
   };
 }
 
-function reportFailure(page: Page, error: unknown): void {
-  if (!(error instanceof ProblemError)) throw error;
-  page.toast(translate("{title}: {detail}", error));
+/** Return the actions of the controls that open limbs to the audience. */
+function createCrowdActions(app: AppParts): CrowdActions {
+  const session = () => app.playback.current?.id ?? null;
+  return {
+    openLimbs: (crowd) => {
+      const id = session();
+      if (id === null) return;
+      editSession(id, { crowd }).catch((error: unknown) => {
+        if (!(error instanceof ProblemError)) throw error;
+        app.page.toast(translate("{title}: {detail}", error));
+      });
+    },
+    share: () => void copyShareLink(session(), app.page.toast),
+    shareLink: async () => (await createShareLink(session(), app.page.toast))?.href ?? null,
+  };
 }
 
 /** Load the last avatar file of these, and upload all motion files if this page may. */

@@ -277,6 +277,13 @@ export const JAPANESE_PAGE_MESSAGES = {
   "The limb follows one person at a time, chosen by lot.": "くじで選ばれた一人ずつが動かします。",
   "The limb shows the gesture that most people pull to.": "いちばん多くの人が引くしぐさになります。",
   "Copy a link for the audience": "観客用のリンクをコピー",
+  "Show a QR code": "QRコードを表示",
+  "Hide the QR code": "QRコードを隠す",
+  "QR code of the link for the audience": "観客用リンクのQRコード",
+  "Other devices do not reach this address. Start the server with --host 0.0.0.0.":
+    "ほかの機器からこのアドレスには接続できません。--host 0.0.0.0を付けてサーバーを起動してください。",
+  "The QR code could not be loaded. Check your connection, then try again":
+    "QRコードを読み込めませんでした。接続を確認してから、もう一度お試しください",
   Pull: "引く",
   "Let go": "放す",
   "Pull {limb}": "{limb}を引く",

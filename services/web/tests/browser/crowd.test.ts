@@ -152,8 +152,11 @@ describeInBrowser("crowd", { server: "open" }, (fixture) => {
       expect(await findViolations(page), colorScheme).toEqual([]);
       await page.getByRole("button", { name: "Strings", exact: true }).click();
       await expect.poll(() => openLimbs(page)).toEqual(["Left hand", "Right leg", "Left leg"]);
+      await page.getByRole("button", { name: "Show a QR code" }).click();
+      await page.getByRole("img", { name: "QR code of the link for the audience" }).waitFor();
       await waitForDraw(page);
       expect(await findViolations(page), `${colorScheme}, panel`).toEqual([]);
+      await page.getByRole("button", { name: "Hide the QR code" }).click();
       await page.getByRole("button", { name: "Close strings" }).click();
     }
   });

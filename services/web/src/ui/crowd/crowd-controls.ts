@@ -14,8 +14,17 @@ export interface CrowdControls {
   render(limbs: readonly LimbState[], ready: boolean, selected: number): void;
 }
 
-/** Create the controls. `onEdit` opens and closes limbs, `onShare` copies a link for the audience. */
-export function createCrowdControls(onEdit: (edit: CrowdEdit) => void, onShare: () => void): CrowdControls {
+export interface CrowdActions {
+  /** Open limbs to the audience, and close them. */
+  openLimbs(edit: CrowdEdit): void;
+  /** Copy a link for the audience. */
+  share(): void;
+  /** Return a link for the audience; null if there is none, which was reported. */
+  shareLink(): Promise<string | null>;
+}
+
+/** Create the controls. */
+export function createCrowdControls(actions: CrowdActions): CrowdControls {
   const policies = Object.keys(POLICY_NAMES) as CrowdPolicy[];
   const options = policies.map((policy) => element("option", { value: policy }, translate(POLICY_NAMES[policy])));
   const chooser = element("select", { class: "text-field" }, ...options);
@@ -27,13 +36,13 @@ export function createCrowdControls(onEdit: (edit: CrowdEdit) => void, onShare: 
   const buttons = LIMB_ORDER.map((part) => {
     const onClick = () => {
       const limb = limbNumber(performer, part);
-      onEdit({ [limb]: open.includes(limb) ? null : policy() });
+      actions.openLimbs({ [limb]: open.includes(limb) ? null : policy() });
     };
     return { part, button: element("button", { type: "button", onClick }, translate(LIMB_NAMES[part])) };
   });
   chooser.addEventListener("change", () => {
     writeEffect();
-    if (open.length > 0) onEdit(Object.fromEntries(open.map((limb) => [limb, policy()])));
+    if (open.length > 0) actions.openLimbs(Object.fromEntries(open.map((limb) => [limb, policy()])));
   });
   writeEffect();
   const details = element(
@@ -49,9 +58,10 @@ export function createCrowdControls(onEdit: (edit: CrowdEdit) => void, onShare: 
     effect,
     element(
       "button",
-      { class: "text-button", type: "button", onClick: onShare },
+      { class: "text-button", type: "button", onClick: actions.share },
       translate("Copy a link for the audience"),
     ),
+    createQrToggle(actions.shareLink),
   );
   let wasOpen = false;
   return {
@@ -74,4 +84,27 @@ export function createCrowdControls(onEdit: (edit: CrowdEdit) => void, onShare: 
       wasOpen = open.length > 0;
     },
   };
+}
+
+/** Create the button that shows and hides a QR code of the link. Each code has a new link. */
+function createQrToggle(createLink: () => Promise<string | null>): HTMLElement {
+  const place = element("div", { role: "status" });
+  const toggle = element("button", { class: "text-button", type: "button", "aria-expanded": "false" });
+  const show = (content: Node | string | null) => {
+    place.replaceChildren(content ?? "");
+    toggle.setAttribute("aria-expanded", String(content !== null));
+    setText(toggle, translate(content === null ? "Show a QR code" : "Hide the QR code"));
+  };
+  show(null);
+  toggle.addEventListener("click", () => {
+    if (toggle.getAttribute("aria-expanded") === "true") show(null);
+    else
+      void Promise.all([import("./qr-picture"), createLink()]).then(
+        ([{ createQrPicture }, link]) => {
+          if (link !== null) show(createQrPicture(link));
+        },
+        () => show(translate("The QR code could not be loaded. Check your connection, then try again")),
+      );
+  });
+  return element("div", {}, toggle, place);
 }

@@ -2,7 +2,7 @@
 import { translate, translateToParts } from "../../i18n/translator";
 import type { DigitalInput } from "../../input/digital-input";
 import { isHand, limbNumber } from "../../wire/limbs";
-import type { CrowdControls, CrowdEdit } from "../crowd/crowd-controls";
+import type { CrowdActions, CrowdControls } from "../crowd/crowd-controls";
 import { element, setAttribute, setText } from "../dom";
 import { limbIcon } from "../icon";
 import { holderColour, isPulledHere, limbButtonName, openCrowd } from "../limb-display";
@@ -50,8 +50,8 @@ export interface StringsActions {
    * Control the hands by camera, or stop it. `onChange` is told whether the camera is on. Rejects if it is not loaded.
    */
   useCamera(onChange: (isOn: boolean) => void): Promise<void>;
-  /** Open limbs to the audience, and close them. Omitted if this page may not. */
-  openLimbs?(edit: CrowdEdit): void;
+  /** Actions of the controls of the audience. Omitted if this page may not open limbs. */
+  crowd?: CrowdActions;
 }
 
 /** Action of a limb's button. */
@@ -60,7 +60,7 @@ type LimbAction = "toggle" | "ask" | "withdraw" | "give";
 /** Create panel and dock in `root`. */
 export function createStringsPanel(
   root: HTMLElement,
-  actions: StringsActions & { close(): void; keys(): void; share(): void },
+  actions: StringsActions & { close(): void; keys(): void },
 ): StringsPanel {
   const panel = createPanel(root, "strings", translate("Strings"), actions.close);
   /** Selected performer, and the number of performers. */
@@ -191,8 +191,8 @@ export function createStringsPanel(
         ({ createCameraButton, createCrowdControls, createDirectionPad }) => {
           for (const { limb, setPad } of rows) setPad(createDirectionPad(limb, actions.press));
           keys.before(createCameraButton(actions.useCamera));
-          if (!actions.openLimbs) return;
-          crowdControls = createCrowdControls(actions.openLimbs, actions.share);
+          if (!actions.crowd) return;
+          crowdControls = createCrowdControls(actions.crowd);
           panel.body.append(crowdControls.element);
           renderControls();
         },
