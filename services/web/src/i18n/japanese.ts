@@ -266,6 +266,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   // the audience pulls
   "Let the audience pull": "観客にも動かしてもらう",
   "Open to the audience": "観客に開放中",
+  "Open to all": "開放中",
   "Many pulls become one by": "みんなの引く力のまとめ方",
   "Mean without extremes": "極端なものを除いた平均",
   Median: "中央値",

@@ -19,6 +19,7 @@ const DEFERRED_FILES = [
   /\/hands-/,
   /planted-feet-/,
   /edge-smoothing-/,
+  /crowd-(status|text)-/,
   // what the solver of limbs shares with that of bonds
   /point-/,
 ];

@@ -55,7 +55,9 @@ export function createCrowdStatus(
       if (!open) return;
       setText(row.name, capitalise(limbName(open.limb, performers)));
       setText(row.pulls, ` ${describePulls(open.crowd)}`);
-      setText(row.policy, describePolicy(open.limb, open.crowd, seconds));
+      const text = describePolicy(open.limb, open.crowd, seconds);
+      // Said once for all.
+      setText(row.policy, index > 0 && text === rows[0].policy.textContent ? "" : text);
     });
     const count = shown.length - MAX_ROWS;
     more.hidden = count <= 0;

@@ -254,7 +254,7 @@ function limbAction(state: LimbState): LimbAction {
 function limbStatus(state: LimbState): string {
   const { holder, requesters, requestedByMe } = state;
   const crowd = openCrowd(state);
-  if (crowd) return crowd.isPulled ? translate("You pull this") : translate("Open to the audience");
+  if (crowd) return crowd.isPulled ? translate("You pull this") : translate("Open to all");
   if (!holder) return translate("Free");
   if (holder.mine)
     return requesters.length > 0
