@@ -77,7 +77,7 @@ def move_limb(crowd: Crowd, policy: str) -> BondedStage:
     """Return a stage whose left hand the crowd has moved for `SECONDS`."""
     frames = round(SECONDS * 1e6 / FRAME_INTERVAL_US)
     stage = BondedStage([random_dance(frames, np.random.default_rng(1), (0.0, 0.9, 0.0), 0.0)], (0, 1))
-    control = CrowdControl(stage.ownership, lambda _: None)
+    control = CrowdControl(stage.ownership, lambda *_: None)
     control.set_policies({LEFT_HAND: policy}, START_US)
     next_summary = START_US
     for frame in range(frames):

@@ -4,6 +4,7 @@ import msgpack
 import pytest
 
 from bunraku.marionette.crowd.crowd_limb import SUMMARY_LIFETIME_US
+from bunraku.marionette.crowd.policy import TURN_US
 from bunraku.marionette.crowd.pulls import CrowdPulls as Pulls
 from bunraku.marionette.ownership import Ownership
 from bunraku.session.crowd_control import CROWD, PULLS_INTERVAL_US, CrowdControl
@@ -19,8 +20,18 @@ class Stage:
     def __init__(self) -> None:
         self.ownership = Ownership(4)
         self.shown: list[CrowdPulls] = []
-        self.control = CrowdControl(self.ownership, lambda data: self.shown.append(unpack(data)))  # type: ignore[arg-type]
+        self.turns: list[list[int | None]] = []
+        self.control = CrowdControl(self.ownership, self._receive)
         self.control.set_policies({1: "trimmed mean"}, 0)
+
+    def _receive(self, subject: str, data: bytes) -> None:
+        if subject == "turn":
+            self.turns.append(msgpack.unpackb(data))
+        else:
+            pulls = unpack(data)
+            assert subject == "pulls"
+            assert isinstance(pulls, CrowdPulls)
+            self.shown.append(pulls)
 
     def pull(self, now: int, *xs: float, limb: int = 1) -> bool:
         pulls = Pulls(limb)
@@ -86,3 +97,40 @@ def test_sample_of_pulls_is_shown_at_a_low_rate_and_ends_empty() -> None:
 def test_malformed_summary_is_refused() -> None:
     with pytest.raises(MalformedMessage):
         Stage().control.receive(msgpack.packb(["r", 1, 5, b"short"]), 5)
+
+
+def test_votes_for_each_gesture_are_shown() -> None:
+    stage = Stage()
+    stage.control.set_policies({3: "vote"}, 0)
+    stage.pull(LATER, 1.4, 1.3, -0.5, limb=3)
+    stage.control.apply(LATER)
+    assert stage.shown[-1].votes == [2, 0, 0, 1]
+    stage.control.set_policies({3: "median"}, LATER)
+    stage.pull(LATER + PULLS_INTERVAL_US, 1.4, limb=3)
+    stage.control.apply(LATER + PULLS_INTERVAL_US)
+    assert stage.shown[-1].votes is None
+
+
+def test_turns_are_published_when_they_begin_and_end() -> None:
+    stage = Stage()
+    stage.control.set_policies({1: "turns"}, 0)
+    for now in range(LATER, LATER + TURN_US + 100_000, 50_000):
+        stage.pull(now, 0.25, 0.75)
+        stage.control.apply(now)
+    (limb, first, _), (_, second, _) = stage.turns
+    assert limb == 1
+    assert (first, second) == (LATER // TURN_US, LATER // TURN_US + 1)
+    stage.control.apply(LATER + TURN_US + 100_000 + SUMMARY_LIFETIME_US)
+    assert stage.turns[2:] == [[1, 0, None]]
+    stage.control.set_policies({}, LATER + TURN_US)
+    assert len(stage.turns) == 3
+
+
+def test_turn_ends_when_its_limb_is_closed_or_gets_another_policy() -> None:
+    for policies in ({}, {1: "median"}):
+        stage = Stage()
+        stage.control.set_policies({1: "turns"}, 0)
+        stage.pull(LATER, 0.5)
+        stage.control.apply(LATER)
+        stage.control.set_policies(policies, LATER)
+        assert [rank is None for _, _, rank in stage.turns] == [False, True]

@@ -8,7 +8,7 @@ import pytest
 from bunraku.marionette.crowd.pulls import PULL_LIFETIME_US
 from bunraku.marionette.crowd.summary import CrowdSummary
 from bunraku.stream.crowd_relay import CrowdRelay
-from bunraku.wire.messages import Presence, Pull
+from bunraku.wire.messages import CrowdTurn, Presence, Pull
 from tests.time_limit import HANG_TIMEOUT_S
 
 OPEN = Presence(0, [], [None] * 4, crowd=[{"limb": 1, "policy": "median", "pulls": 0}])
@@ -21,8 +21,15 @@ class Owner:
         self.now = 0
         self.received: list[tuple[int, CrowdSummary]] = []
         self._more = asyncio.Event()
-        self.relay = CrowdRelay("r", lambda: self.now, self._receive)
+        self.relay: CrowdRelay[str | int] = CrowdRelay("r", lambda: self.now, self._receive)
         self.relay.set_presence(OPEN)
+
+    async def find_turn(self) -> bytes:
+        """Return the message by which the owner gives the turn to the member that the next summary proposes."""
+        turn = (await self.wait_for_summary()).turn
+        assert turn is not None
+        packed: bytes = msgpack.packb([1, -turn.negative_turn, turn.rank])
+        return packed
 
     def _receive(self, message: bytes) -> None:
         replica, limb, sent_us, packed = msgpack.unpackb(message)
@@ -66,4 +73,22 @@ async def test_any_finite_place_can_be_summarised(place: list[float]) -> None:
     owner = Owner()
     owner.relay.pull("a", Pull(1, place))
     assert (await owner.wait_for_summary()).count == 1
+    owner.relay.close()
+
+
+async def test_members_learn_when_their_turn_begins_and_ends() -> None:
+    owner = Owner()
+    owner.relay.pull("ada", Pull(1, [0.1, 0.0, 0.0]))
+    ada = await owner.find_turn()
+    assert owner.relay.receive_turn(ada) == [("ada", CrowdTurn(1, True))]
+    assert owner.relay.receive_turn(ada) == []
+    owner.now += PULL_LIFETIME_US + 1
+    owner.relay.pull("bo", Pull(1, [0.2, 0.0, 0.0]))
+    bo = await owner.find_turn()
+    assert owner.relay.receive_turn(bo) == [("ada", CrowdTurn(1, False)), ("bo", CrowdTurn(1, True))]
+    assert owner.relay.receive_turn(msgpack.packb([1, 0, None])) == [("bo", CrowdTurn(1, False))]
+    assert owner.relay.receive_turn(msgpack.packb([1, 7, 12_345])) == []
+    owner.relay.receive_turn(bo)
+    owner.relay.leave("bo")
+    assert owner.relay.receive_turn(msgpack.packb([1, 0, None])) == []
     owner.relay.close()

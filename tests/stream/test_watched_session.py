@@ -21,7 +21,16 @@ from bunraku.stream.viewer_connection import ViewerConnection
 from bunraku.stream.watched_session import WatchedSessions
 from bunraku.websocket.frame import Opcode, encode_frame
 from bunraku.websocket.subprotocol import NOT_FOUND, SERVICE_RESTART, CloseConnection
-from bunraku.wire.messages import ChannelHeader, CrowdPulls, Description, Presence, Problem, Pull, TimelineState
+from bunraku.wire.messages import (
+    ChannelHeader,
+    CrowdPulls,
+    CrowdTurn,
+    Description,
+    Presence,
+    Problem,
+    Pull,
+    TimelineState,
+)
 from bunraku.wire.overlay import Overlay
 from tests.stream.fake_transport import FakeTransport, parse_frames
 from tests.time_limit import HANG_TIMEOUT_S
@@ -112,6 +121,10 @@ async def test_pulls_of_viewers_are_summarised_for_the_owner_and_its_sample_is_s
     pulls = CrowdPulls(1, 2, [[0.5, 0.0, 0.0]])
     bus.publish("session.s.pulls", pulls.pack())
     assert pulls in joined[0][1].messages
+    turn = CrowdSummary.unpack(packed).turn
+    assert turn is not None
+    bus.publish("session.s.turn", msgpack.packb([1, -turn.negative_turn, turn.rank]))
+    assert sum(CrowdTurn(1, True) in transport.messages for _, transport in joined) == 1
     for viewer, _ in joined:
         viewer.on_close()
     assert "session.s.pulls" not in bus._handlers

@@ -44,7 +44,7 @@ CHANNELS: dict[str, tuple[str, str, tuple[str, ...]]] = {
         "One viewer of a session.",
         (
             *("ChannelHeader", "Description", "TimelineState", "Presence", "Data", "Overlay", "Live", "Choice"),
-            *("CrowdPulls", "Pong", "Problem", "Ping", "Report", "Pull"),
+            *("CrowdPulls", "CrowdTurn", "Pong", "Problem", "Ping", "Report", "Pull"),
         ),
     ),
     "sessionControl": (

@@ -24,6 +24,7 @@ from bunraku.wire.messages import (
     Choice,
     Claim,
     CrowdPulls,
+    CrowdTurn,
     Data,
     Description,
     Edit,
@@ -181,6 +182,8 @@ def make_vectors() -> dict[str, Any]:
         Put(7, limb=5),
         Put(0, place=[0.5, -0.25, 1.5]),
         PropRefusal(7, "held"),
+        CrowdPulls(6, 3, [[0.5, -0.25, 0.125]], [2, 0, 1, 0]),
+        CrowdTurn(1, True),
     ]
     target = Input(1, Input.TARGET, 9, 12, NOW_US, (0.5, -0.25, 0.125)).pack()
     live = Live(NOW_US, 2, {0: LiveBlock(8_000, b"ab"), 1: LiveBlock(4_000, b"c")}).pack()

@@ -53,6 +53,7 @@ from bunraku.wire.messages import (
     ChannelHeader,
     Choice,
     CrowdPulls,
+    CrowdTurn,
     Data,
     Description,
     Pong,
@@ -100,6 +101,8 @@ class Viewer:
         self.presence: Presence | None = None
         self.crowd_pulls: dict[int, CrowdPulls] = {}
         """Newest number and sample of the crowd's pulls of each limb, by number; limbs that nobody pulls have none."""
+        self.crowd_turns: set[int] = set()
+        """Limbs of the policy `turns` that follow this viewer's pull now."""
         self.motion: str | None = None
         self._tracks: TrackSet | None = None
         self._overlays = OverlayBuffer()
@@ -150,6 +153,7 @@ class Viewer:
         """Reset what belongs to one connection."""
         self.clock.restart()
         self.crowd_pulls.clear()
+        self.crowd_turns.clear()
         self.timeline_history.restart()
         self._reporter.restart()
 
@@ -365,6 +369,8 @@ class Viewer:
             self.crowd_pulls.pop(message.limb, None)
             if message.count:
                 self.crowd_pulls[message.limb] = message
+        elif isinstance(message, CrowdTurn):
+            (self.crowd_turns.add if message.yours else self.crowd_turns.discard)(message.limb)
         elif isinstance(message, Choice):
             self.statistics.reason = message.reason
         elif isinstance(message, Problem):

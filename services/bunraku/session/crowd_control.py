@@ -31,8 +31,8 @@ COUNT_INTERVAL_US = 1_000_000
 class CrowdControl:
     """Open limbs of one stage, by number. Times are clock time in µs."""
 
-    def __init__(self, ownership: Ownership, publish: Callable[[bytes], None]) -> None:
-        """`publish` sends a message to all viewers."""
+    def __init__(self, ownership: Ownership, publish: Callable[[str, bytes], None]) -> None:
+        """`publish` sends a message on `pulls` or `turn`, subjects of the session (proto/bus.md)."""
         self._ownership = ownership
         self._publish = publish
         self._limbs: dict[int, CrowdLimb] = {}
@@ -40,6 +40,7 @@ class CrowdControl:
         self._counts: dict[int, int] = {}
         self._counted_at = 0
         self._shown_at: dict[int, int] = {}
+        self._turns: dict[int, tuple[int, int]] = {}
 
     @property
     def policies(self) -> dict[int, str]:
@@ -62,12 +63,14 @@ class CrowdControl:
         for limb in tuple(self._limbs):
             if limb not in wanted:
                 self._release(limb, now)
+                self._set_turn(limb, None)
                 del self._limbs[limb]
                 self._counts.pop(limb, None)
                 if self._shown_at.pop(limb, None) is not None:
-                    self._publish(CrowdPulls(limb, 0, []).pack())
+                    self._publish("pulls", CrowdPulls(limb, 0, []).pack())
         for limb, policy in wanted.items():
             if limb not in self._limbs or self._limbs[limb].policy is not policy:
+                self._set_turn(limb, None)
                 self._limbs[limb] = CrowdLimb(limb, policy)
                 self._counts.setdefault(limb, 0)
         return True
@@ -107,6 +110,7 @@ class CrowdControl:
                 epoch, sequence = self._grants[limb]
                 self._grants[limb] = epoch, sequence + 1
                 self._ownership.apply_input(CROWD, LimbInput(limb, InputKind.TARGET, epoch, sequence, now, target), now)
+            self._set_turn(limb, crowd.turn(merged))
             self._show(limb, merged, now)
         is_urgent = any(bool(count) != bool(self._counts.get(limb)) for limb, count in counts.items())
         if counts != self._counts and (is_urgent or now - self._counted_at >= COUNT_INTERVAL_US):
@@ -125,6 +129,16 @@ class CrowdControl:
         epoch, _ = self._grants.pop(limb, (0, 0))
         return self._ownership.release(limb, CROWD, epoch, now)
 
+    def _set_turn(self, limb: int, turn: tuple[int, int] | None) -> None:
+        """Publish number and rank of a turn that begins; None ends the present one."""
+        if turn == self._turns.get(limb):
+            return
+        if turn is None:
+            del self._turns[limb]
+        else:
+            self._turns[limb] = turn
+        self._publish("turn", msgpack.packb([limb, *(turn or (0, None))]))
+
     def _show(self, limb: int, merged: CrowdSummary, now: int) -> None:
         """Send a sample of the pulls at most every `PULLS_INTERVAL_US`, and an empty one after the last."""
         shown_at = self._shown_at.get(limb)
@@ -135,4 +149,4 @@ class CrowdControl:
         else:
             del self._shown_at[limb]
         places = [list(to_target(limb, (x / UNITS, y / UNITS, z / UNITS))) for _, (x, y, z) in merged.sample]
-        self._publish(CrowdPulls(limb, merged.count, places).pack())
+        self._publish("pulls", CrowdPulls(limb, merged.count, places, self._limbs[limb].votes(merged)).pack())

@@ -1,7 +1,7 @@
 """One session: timeline, puppeteers, and the overlay of their limbs (paper 5).
 
 The stage publishes on the bus, on `session.{id}.`: `timeline` (message 4), `presence` (6), `overlay` (5), `pulls` (17),
-and `appear` when it takes over a session of another replica or is connected to the bus again. It subscribes to
+`turn`, and `appear` when it takes over a session of another replica or is connected to the bus again. It subscribes to
 `viewers` and `crowd` and responds to `state`. Overlays are computed for the time when they are due, `OVERLAY_LEAD_US`
 ahead of now, so that every viewer can show them on time.
 """
@@ -109,7 +109,7 @@ class Stage:
         self._marionettes = Marionettes(_performer_figures(start.motion), solver=solver)
         self._ownership = self._marionettes.ownership
         self._bonds = BondControl(self._ownership, self.puppeteers)
-        self.crowd = CrowdControl(self._ownership, lambda pulls: bus.publish(f"session.{start.id}.pulls", pulls))
+        self.crowd = CrowdControl(self._ownership, lambda kind, data: bus.publish(f"session.{start.id}.{kind}", data))
         self.crowd.set_policies(start.fittings.crowd, clock())
         self.props = PropControl(start.fittings.props)
         self._set_motion(start.motion)

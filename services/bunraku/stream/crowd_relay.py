@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
 
 import msgpack
 
 from bunraku.marionette.crowd.pulls import CrowdPulls
-from bunraku.wire.messages import Presence, Pull
+from bunraku.wire.messages import CrowdTurn, Presence, Pull
 
 SUMMARY_INTERVAL_S = 0.05
 
+Member = TypeVar("Member", bound=Hashable)
 
-class CrowdRelay:
-    """Members of the crowd of one session at this replica: any objects, usually viewers."""
+
+class CrowdRelay(Generic[Member]):
+    """Members of the crowd of one session at this replica, usually viewers."""
 
     def __init__(self, replica: str, clock: Callable[[], int], publish: Callable[[bytes], None]) -> None:
         """`clock` returns microseconds; `publish` sends a summary to the owner."""
@@ -29,7 +32,8 @@ class CrowdRelay:
         self._open_limbs: frozenset[int] = frozenset()
         self._pulls: dict[int, CrowdPulls] = {}
         # random, so that no client can choose its turns
-        self._keys: dict[object, int] = {}
+        self._keys: dict[Member, int] = {}
+        self._turns: dict[int, Member] = {}
         self._timer: asyncio.TimerHandle | None = None
 
     def set_presence(self, presence: Presence) -> None:
@@ -37,7 +41,7 @@ class CrowdRelay:
         self._open_limbs = frozenset(entry["limb"] for entry in presence.crowd or ())
         self._pulls = {limb: pulls for limb, pulls in self._pulls.items() if limb in self._open_limbs}
 
-    def pull(self, member: object, message: Pull) -> None:
+    def pull(self, member: Member, message: Pull) -> None:
         """Record a member's pull; it has no effect on a limb that is not open."""
         if message.limb not in self._open_limbs:
             return
@@ -52,12 +56,25 @@ class CrowdRelay:
         if self._timer is None:
             self._schedule()
 
-    def leave(self, member: object) -> None:
+    def leave(self, member: Member) -> None:
         """Forget a member."""
+        self._turns = {limb: other for limb, other in self._turns.items() if other is not member}
         key = self._keys.pop(member, None)
         if key is not None:
             for pulls in self._pulls.values():
                 pulls.leave(key)
+
+    def receive_turn(self, message: bytes) -> list[tuple[Member, CrowdTurn]]:
+        """Return what to send to the members here whose turn ends or begins, as the owner has published."""
+        limb, turn, rank = msgpack.unpackb(message)[:3]
+        pulls = self._pulls.get(limb)
+        key = None if rank is None or pulls is None else pulls.find_rank(turn, rank)
+        before, member = self._turns.pop(limb, None), None
+        if key is not None:
+            member = next(one for one, its_key in self._keys.items() if its_key == key)
+            self._turns[limb] = member
+        changes = ((before, False), (member, True)) if before is not member else ()
+        return [(one, CrowdTurn(limb, yours)) for one, yours in changes if one is not None]
 
     def close(self) -> None:
         """Publish nothing more."""

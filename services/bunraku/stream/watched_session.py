@@ -97,7 +97,9 @@ class WatchedSession:
         self._overlay: bytes | None = None if overlay is None else encode_frame(overlay)
         self._presence = encode_frame(presence)
         # not a method of this object: without a reference cycle both are freed at once
-        self._crowd = CrowdRelay(source.replica, context.clock, partial(source.bus.publish, f"{self._subject}.crowd"))
+        self._crowd: CrowdRelay[ViewerConnection] = CrowdRelay(
+            source.replica, context.clock, partial(source.bus.publish, f"{self._subject}.crowd")
+        )
         self._crowd.set_presence(_parse_presence(presence))
         self._timeline = _parse_timeline(timeline)
         self._on_timeline(timeline)
@@ -107,6 +109,7 @@ class WatchedSession:
             source.bus.subscribe(f"{self._subject}.overlay", self._on_overlay),
             source.bus.subscribe(f"{self._subject}.live", self._send_newest),
             source.bus.subscribe(f"{self._subject}.pulls", self._on_pulls),
+            source.bus.subscribe(f"{self._subject}.turn", self._on_turn),
             source.bus.subscribe(f"{self._subject}.appear", self._on_session_takeover),
         ]
 
@@ -299,6 +302,11 @@ class WatchedSession:
         """Send the crowd's pulls to the viewers on unconstrained links; others do without."""
         sent_bytes = self._writable_group().write(encode_frame(message))
         self._context.counters.bytes += sent_bytes
+
+    def _on_turn(self, message: bytes) -> None:
+        """Tell the viewers here whose turn ends or begins."""
+        for viewer, turn in self._crowd.receive_turn(message):
+            viewer.send_control(encode_frame(turn.pack()))
 
 
 class WatchedSessions:

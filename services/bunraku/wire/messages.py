@@ -199,6 +199,19 @@ class CrowdPulls(_MapMessage):
     limb: LimbNumber
     count: Annotated[SafeInteger, Field(description="Number of members who pull.")]
     places: Annotated[list[Place], Field(max_length=MAX_SHOWN_PULLS, description="Targets of some of them.")]
+    votes: Annotated[
+        list[SafeInteger] | None,
+        Field(min_length=1, description="Votes for each gesture of the limb; absent: the policy is not `vote`."),
+    ] = None
+
+
+@dataclass(frozen=True, slots=True)
+class CrowdTurn(_MapMessage):
+    """Begin or end of this viewer's turn to move a limb that is open to the crowd."""
+
+    TYPE = 19
+    limb: LimbNumber
+    yours: Annotated[Flag, Field(description="True: the limb follows this viewer's pull.")]
 
 
 @dataclass(frozen=True, slots=True)
@@ -416,15 +429,15 @@ class Input:
 
 Message = (
     ChannelHeader | Description | Data | TimelineState | Overlay | Presence | Pong | Problem | Welcome | Grant
-    | Refusal | Notice | BondEnd | CrowdPulls | PropRefusal | Choice | Live | Ping | Edit | Report | Claim | Release
-    | Alive | Ask | Bond | Pull | Put | Input | Sample
+    | Refusal | Notice | BondEnd | CrowdPulls | PropRefusal | CrowdTurn | Choice | Live | Ping | Edit | Report | Claim
+    | Release | Alive | Ask | Bond | Pull | Put | Input | Sample
 )  # fmt: skip
 
 FIXED_MESSAGES = (Data, Overlay, Live, Ping, Pong, Input, Sample)
 """Messages of fixed layout."""
 MAP_MESSAGES = (
     ChannelHeader, Description, TimelineState, Presence, Problem, Welcome, Grant, Refusal, Notice, BondEnd,
-    CrowdPulls, PropRefusal, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull, Put,
+    CrowdPulls, PropRefusal, CrowdTurn, Choice, Edit, Report, Claim, Release, Alive, Ask, Bond, Pull, Put,
 )  # fmt: skip
 """Messages that are a MessagePack map."""
 

@@ -55,6 +55,16 @@ class CrowdLimb:
             return to_target(self._limb, mean_target(merged, self.policy))
         return to_target(self._limb, (x / UNITS, y / UNITS, z / UNITS))
 
+    def votes(self, merged: CrowdSummary) -> list[int] | None:
+        """Return the votes for each gesture; None under another policy than `vote`."""
+        return merged.votes[: len(self._gestures)].tolist() if self.policy is CrowdPolicy.VOTE else None
+
+    def turn(self, merged: CrowdSummary) -> tuple[int, int] | None:
+        """Return number and rank of the turn under the policy `turns`; None if nobody pulls."""
+        if self.policy is not CrowdPolicy.TURNS or merged.turn is None:
+            return None
+        return -merged.turn.negative_turn, merged.turn.rank
+
     def _count_votes(self, merged: CrowdSummary, now: int) -> int:
         """Return the gesture of this interval: the one with the most votes at its begin, the first of equal ones."""
         interval = now // VOTE_US

@@ -50,6 +50,12 @@ class CrowdPulls:
         """Forget the pull of a member."""
         self._pulls.pop(key, None)
 
+    def find_rank(self, turn: int, rank: int) -> int | None:
+        """Return the key of the member who has this rank in a turn; None if it is at another replica."""
+        keys = np.fromiter(self._pulls, np.uint64, len(self._pulls))
+        found = keys[_rank(keys, turn) == np.uint64(rank)]
+        return int(found[0]) if found.size else None
+
     def summarise(self, now: int) -> CrowdSummary:
         """Drop the pulls that have ended, and return the summary of the others."""
         for key in [key for key, (_, newest, _) in self._pulls.items() if now - newest > PULL_LIFETIME_US]:
@@ -75,9 +81,13 @@ def _find_turn(keys: npt.NDArray[np.uint64], begins: Integers, points: Integers,
     """Return the member of the smallest rank, of those who pulled when the turn began if there are any."""
     turn = now // TURN_US
     is_newcomer = begins > turn * TURN_US
-    ranks = _mix(keys ^ _mix(np.array([turn], np.uint64)))
+    ranks = _rank(keys, turn)
     n = int(np.lexsort((ranks, is_newcomer))[0])
     return TurnCandidate(-turn, bool(is_newcomer[n]), int(ranks[n]), _point(points[n]))
+
+
+def _rank(keys: npt.NDArray[np.uint64], turn: int) -> npt.NDArray[np.uint64]:
+    return _mix(keys ^ _mix(np.array([turn], np.uint64)))
 
 
 def _mix(values: npt.NDArray[np.uint64]) -> npt.NDArray[np.uint64]:

@@ -12,6 +12,8 @@ import { listenToMouse } from "../input/mouse";
 import { listenToPointer } from "../input/pointer-events";
 import { LIMBS } from "../motion/skeleton";
 import type { Theme } from "../stage/scenery/look";
+import type { CrowdStatus } from "../ui/crowd/crowd-status";
+import type { LimbState } from "../ui/limb-state";
 import type { Page } from "../ui/page";
 import type { LabelMetrics } from "../ui/strings/label-layout";
 import type { StagedAvatars } from "./avatar-slot";
@@ -58,6 +60,9 @@ export class StageHost {
   readonly #overlay: StageOverlay;
   readonly #gamepad: GamepadPolling;
   #isReady = false;
+  #limbs: readonly LimbState[] = [];
+  /** Status of the limbs that are open to the audience; null while there were none. */
+  #crowdStatus: CrowdStatus | null = null;
   /** VR; null while it is not loaded. */
   #immersive: ImmersiveMode | null = null;
 
@@ -234,7 +239,18 @@ export class StageHost {
     page.nameTags.setLimbs(limbs);
     page.strings.render(limbs, isReady, performer);
     page.limbRequests.render(limbs, giveKey);
+    if (this.#crowdStatus || limbs.some(({ crowd }) => crowd)) void this.#showCrowd(limbs);
     page.library.danceAs.dancers(limbs, performer);
+  }
+
+  async #showCrowd(limbs: readonly LimbState[]): Promise<void> {
+    this.#limbs = limbs;
+    // Without a connection it stays absent until the next change.
+    const chunk = this.#crowdStatus ? null : await import("../ui/crowd/crowd-status").catch(() => null);
+    const { page } = this.options;
+    const getClock = () => this.options.getPlayback().current?.ownTime(performance.now()) ?? 0;
+    if (chunk) this.#crowdStatus ??= chunk.createCrowdStatus(page.messageArea.element, getClock, page.toast);
+    this.#crowdStatus?.render(this.#limbs);
   }
 
   #listenToInputs(): void {

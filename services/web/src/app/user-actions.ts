@@ -1,12 +1,13 @@
 /** Actions of the page's controls and of its keys, as functions of the application's parts. */
 
 import { pageAccess } from "../client/access";
-import { recordSession } from "../client/api";
+import { editSession, recordSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import { switchLanguage } from "../i18n/language";
 import { translate } from "../i18n/translator";
 import type { PageActions } from "../input/command-dispatcher";
 import type { Mapping } from "../input/mapping";
+import type { CrowdActions } from "../ui/crowd/crowd-controls";
 import type { EditActions } from "../ui/library/motion-editor";
 import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem } from "../ui/library/problem-report";
@@ -24,7 +25,7 @@ import type { PlaybackController } from "./playback-controller";
 import { createPropActions, moveNearestProp, type PropContext } from "./prop-actions";
 import type { RemotePlayback } from "./remote-playback";
 import { savePosition } from "./saved-position";
-import { copyShareLink } from "./share-link";
+import { copyShareLink, createShareLink } from "./share-link";
 import type { SoundController } from "./sound-controller";
 import type { StageHost } from "./stage-host";
 import type { UploadTarget } from "./upload-controller";
@@ -94,6 +95,11 @@ export function createUserActions(app: AppParts): UserActions {
     reframe: () => app.stageHost.resize(),
     labels: (metrics) => app.stageHost.setLabels(metrics),
     mappingShown: () => app.stageHost.pollGamepad(),
+    ...(pageAccess.allows("control")
+      ? {
+          crowd: createCrowdActions(app),
+        }
+      : {}),
     ...(pageAccess.allows("ingest")
       ? {
           keep: createPageRecordAction(app),
@@ -136,6 +142,23 @@ export function createKeyActions(app: AppParts): PageActions {
     library: () => app.page.panels.toggle("library"),
     strings: () => app.page.panels.toggle("strings"),
     line: () => app.page.panels.toggle("line"),
+  };
+}
+
+/** Return the actions of the controls that open limbs to the audience. */
+function createCrowdActions(app: AppParts): CrowdActions {
+  const session = () => app.playback.current?.id ?? null;
+  return {
+    openLimbs: (crowd) => {
+      const id = session();
+      if (id === null) return;
+      editSession(id, { crowd }).catch((error: unknown) => {
+        if (!(error instanceof ProblemError)) throw error;
+        app.page.toast(translate("{title}: {detail}", error));
+      });
+    },
+    share: () => void copyShareLink(session(), app.page.toast),
+    shareLink: async () => (await createShareLink(session(), app.page.toast))?.href ?? null,
   };
 }
 

@@ -48,7 +48,7 @@ const NO_BLOCKS = new Int8Array(0);
  * - "open": connected; "replaced" follows if a silent connection was replaced.
  * - "figure": a motion was described; "tracks": more of its tracks were.
  * - "timeline", "presence": there is a new one.
- * - "pulls": `crowdPulls` changed.
+ * - "pulls": `crowdPulls` or `crowdTurns` changed.
  * - "blocks": `blocks` of the first performer changed.
  * - "closed" (a CustomEvent, detail: the reason): the connection is lost, or closed for good if `isClosed`.
  */
@@ -60,6 +60,8 @@ export class Viewer extends EventTarget {
   presence: Presence | null = null;
   /** Number and some places of the crowd's pulls, by number of the limb; limbs that nobody pulls have none. */
   readonly crowdPulls = new Map<number, CrowdPulls>();
+  /** Limbs of the policy `turns` that follow this viewer's pull now. */
+  readonly crowdTurns = new Set<number>();
   motion: string | null = null;
   readonly timelineHistory = new TimelineHistory();
   /** Source of the stage time that the audio presents at local `nowMs`; the stage follows it while it is not null. */
@@ -296,6 +298,8 @@ export class Viewer extends EventTarget {
   private onOpen(replaced: boolean): void {
     this.collector.closeReason = null;
     this.resumeTimeline = this.timelineHistory.newest;
+    this.crowdPulls.clear();
+    this.crowdTurns.clear();
     this.clock.restart();
     this.timelineHistory.restart();
     this.reporter.restart();
@@ -348,6 +352,11 @@ export class Viewer extends EventTarget {
       case "CrowdPulls":
         if (message.count > 0) this.crowdPulls.set(message.limb, message);
         else this.crowdPulls.delete(message.limb);
+        this.dispatch("pulls");
+        break;
+      case "CrowdTurn":
+        if (message.yours) this.crowdTurns.add(message.limb);
+        else this.crowdTurns.delete(message.limb);
         this.dispatch("pulls");
         break;
       case "Choice":

@@ -3,6 +3,7 @@ import type { Translator } from "../i18n/translator";
 import tokens from "../style/tokens.css?inline";
 import { element, setAttribute } from "../ui/dom";
 import { icon, limbIcon } from "../ui/icon";
+import { capitalise, holderColour, isPulledHere, limbButtonName } from "../ui/limb-display";
 import { LIMB_ORDER, type LimbState, limbKey, limbName, performerCount } from "../ui/limb-state";
 import { createToast, type ToastController } from "../ui/notification/toast";
 import { type LabelAnchors, LabelLayout } from "../ui/strings/label-layout";
@@ -153,20 +154,12 @@ export function createElementView(root: ShadowRoot, actions: ElementViewActions,
         const number = limbNumber(selected, limb);
         const { holder } = limbs[number];
         const name = limbName(number, performerCount(limbs), translator);
-        const capitalName = name.charAt(0).toUpperCase() + name.slice(1);
         disc.hidden = !canClaim;
         disc.disabled = !ready;
-        setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute(
-          "aria-label",
-          !holder
-            ? translate("Take the {limb}", { limb: name })
-            : holder.mine
-              ? translate("Release the {limb}, held by you", { limb: name })
-              : translate("{limb}, held by {name}", { limb: capitalName, name: holder.name }),
-        );
-        disc.title = capitalName + translate(", key {key}", { key: limbKey(limb) });
-        if (holder) disc.style.setProperty("--colour", `var(--holder-${holder.colour})`);
+        setAttribute(disc, "data-mine", isPulledHere(limbs[number]));
+        disc.setAttribute("aria-label", limbButtonName(limbs[number], name, translator));
+        disc.title = capitalise(name) + translate(", key {key}", { key: limbKey(limb) });
+        if (holder) disc.style.setProperty("--colour", holderColour(holder));
         else disc.style.removeProperty("--colour");
       }
       updateCount();

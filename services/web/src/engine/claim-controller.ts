@@ -95,6 +95,7 @@ export class ClaimController {
     viewer.addEventListener("figure", updateCount);
     viewer.addEventListener("tracks", updateCount);
     viewer.addEventListener("presence", render);
+    viewer.addEventListener("pulls", render);
     on("welcome", render);
     on("presence", render);
     on<{ limb: number }>("refusal", ({ limb }) => {
@@ -129,6 +130,7 @@ export class ClaimController {
     ] as const;
     const holders = limbHolders(...context);
     const requesters = limbRequesters(...context);
+    const openLimbs = new Map((viewer?.presence?.crowd ?? []).map((open) => [open.limb, open]));
     return holders.map((sessionHolder, limb) => {
       const mine = Boolean(hands?.source(limb) && !hands.isCrowdPull(limb));
       const holder = mine
@@ -136,8 +138,18 @@ export class ClaimController {
         : sessionHolder?.mine
           ? null
           : sessionHolder;
+      const open = openLimbs.get(limb);
       return {
         holder,
+        ...(open && {
+          crowd: {
+            policy: open.policy,
+            pulls: open.pulls,
+            votes: viewer?.crowdPulls.get(limb)?.votes ?? null,
+            hasTurn: viewer?.crowdTurns.has(limb) ?? false,
+            isPulled: hands?.isCrowdPull(limb) ?? false,
+          },
+        }),
         requesters: requesters[limb],
         requestedByMe: puppeteer?.isAsking(limb) ?? false,
         selected: velocity?.selectedLimb === limb && velocity.holds(limb),
@@ -150,7 +162,7 @@ export class ClaimController {
     return !this.viewOnly && state !== undefined && !state.holder;
   }
 
-  /** Return whether a pointer can pull a limb: it is free, or open to the crowd, for viewers too. */
+  /** Return whether this page can pull a limb: it is free, or open to the crowd, for viewers too. */
   canPull(limb: number): boolean {
     return this.isFree(limb) || (this.connected && this.#stageInputs?.hands.isOpen(limb) === true);
   }
@@ -180,9 +192,9 @@ export class ClaimController {
     );
   }
 
-  /** Claim a limb if it is free; else show its holder. Returns whether it is held. */
+  /** Claim a limb if it is free, or pull it with the crowd; else show its holder. Returns whether it is held. */
   claim(limb: number, source: HoldSource): boolean {
-    if (!this.isFree(limb) && !this.#stageInputs?.hands.source(limb)) {
+    if (!this.canPull(limb) && !this.#stageInputs?.hands.source(limb)) {
       this.onClaimRefused(limb);
       return false;
     }
@@ -191,7 +203,6 @@ export class ClaimController {
 
   /** Claim a limb, or release it if this page holds it. */
   toggleClaim(limb: number): void {
-    if (this.viewOnly) return;
     const { hands, velocity } = this.#stageInputs ?? {};
     if (hands?.source(limb)) hands.release(limb);
     else velocity?.hold(limb);
@@ -200,6 +211,8 @@ export class ClaimController {
   /** Report a limb that could not be claimed, and offer to ask its holder for it. */
   onClaimRefused(limb: number): void {
     const state = this.limbStates()[limb];
+    if (this.viewOnly && this.#playback?.viewer.presence)
+      this.view.toast(this.translator.translate("With this link you pull only what is open to the audience"));
     if (this.viewOnly || !state) return;
     this.#stageInputs?.shakeRing(limb);
     const { holder, requestedByMe } = state;
@@ -258,7 +271,8 @@ export class ClaimController {
     const { puppeteer } = this.#playback ?? {};
     if (this.viewOnly || !puppeteer) return;
     const hands = limbsInKeyOrder(this.selectedPerformer.count).filter(isHand);
-    const held = hands.filter((limb) => this.#stageInputs?.hands.source(limb));
+    const { hands: inputs } = this.#stageInputs ?? {};
+    const held = hands.filter((limb) => inputs?.source(limb) && !inputs.isCrowdPull(limb));
     const bond = puppeteer.bonds.find((pair) => pair.some((limb) => held.includes(limb)));
     if (bond) puppeteer.unbond(bond[0], bond[1]);
     else if (held.length === 0) this.view.toast(this.translator.translate("Hold a hand, then join it with another"));

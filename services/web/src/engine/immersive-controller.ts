@@ -23,8 +23,8 @@ export class ImmersiveController {
   ) {
     this.#hands = new HandInput(controller.stage, controller.hands, {
       selectedPerformer: () => controller.selectedPerformer,
-      isFree: (limb) => claims.isFree(limb),
-      isHeldByOther: (limb) => claims.limbStates()[limb]?.holder?.mine === false,
+      isFree: (limb) => claims.canPull(limb),
+      isHeldByOther: (limb) => claims.limbStates()[limb]?.holder?.mine === false && !claims.canPull(limb),
       onClaimed: (limb) => claims.selectedPerformer.select(performerOfLimb(limb)),
       ask: (limb) => claims.requestLimb(limb),
       isAsking: (limb) => claims.limbStates()[limb]?.requestedByMe ?? false,

@@ -94,15 +94,15 @@ export class StageController {
     this.#camera = camera;
     this.hands = new LimbController(this.stage);
     this.hands.onChange = onClaimsChange;
-    const isFree = (limb: number) => limbController.isFree(limb);
+    const canPull = (limb: number) => limbController.canPull(limb);
     const { selectedPerformer: selection } = limbController;
     this.velocity = new VelocityInputs(this.hands, {
       claim: (limb) => limbController.claim(limb, "velocity"),
-      isFree,
+      isFree: canPull,
       selection,
     });
     this.pointer = createPointerInput(this.stage, this.hands, {
-      canClaim: (limb) => limbController.canPull(limb),
+      canClaim: canPull,
       onRefused: (limb) => limbController.onClaimRefused(limb),
       onClaimed: (limb) => selection.select(performerOfLimb(limb)),
       smoothing: () => getMapping().pointerSmoothing,

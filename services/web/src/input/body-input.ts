@@ -33,8 +33,8 @@ const CLAIM_RETRY_MS = 300;
 export interface LimbClaims {
   /** Claim a limb. Return false if it is not available; the user has been told why. */
   claim(limb: number, source: HoldSource): boolean;
-  /** True if no puppeteer holds a limb. */
-  isFree(limb: number): boolean;
+  /** True if no puppeteer holds a limb, or it is open to the crowd. */
+  canPull(limb: number): boolean;
   readonly selectedPerformer: PerformerSelection;
 }
 
@@ -95,7 +95,7 @@ export class BodyInput {
   #updateHold(hand: Hand): void {
     if (hand.limb === null || this.limbs.source(hand.limb) === "camera") return;
     if (this.limbs.source(hand.limb) === null) {
-      hand.needsRest = this.claims.isFree(hand.limb);
+      hand.needsRest = this.claims.canPull(hand.limb);
       hand.isContested = !hand.needsRest;
     }
     hand.limb = null;
@@ -138,7 +138,7 @@ export class BodyInput {
     // A limb that was granted on request is held as by a key.
     if (source !== null && !(source === "velocity" && hand.isContested)) return;
     const isTried = hand.isContested && source === null;
-    if (isTried && (now - hand.triedAt < CLAIM_RETRY_MS || !this.claims.isFree(limb))) return;
+    if (isTried && (now - hand.triedAt < CLAIM_RETRY_MS || !this.claims.canPull(limb))) return;
     hand.triedAt = now;
     hand.isContested = !this.claims.claim(limb, "camera");
     if (!hand.isContested) hand.limb = limb;

@@ -2,7 +2,7 @@
  * The puppeteer's limbs, by limb number over all performers: translates inputs in the audience's frame to messages for
  * the session.
  */
-import { Vector3 } from "three";
+import { type Quaternion, Vector3 } from "three";
 import type { Puppeteer } from "../client/puppeteer";
 import type { Viewer } from "../client/viewer";
 import { JOINTS } from "../motion/skeleton";
@@ -29,6 +29,22 @@ const MIN_THREAD_M = 0.18;
 /** Minimum interval between two pulls on a limb with the crowd, in milliseconds. */
 const CROWD_PULL_INTERVAL_MS = 50;
 
+/** Speed of a hand, in arm lengths per second, and of a thigh, in radians per second, by an input of full velocity. */
+const [HAND_SPEED, THIGH_SPEED] = [1, 2];
+/** Range of a thigh's angle in radians, as of a puppeteer's. */
+const [MIN_THIGH_ANGLE, MAX_THIGH_ANGLE] = [-Math.PI / 4, (2 * Math.PI) / 3];
+/** Longest time for which one frame moves a limb, in milliseconds. */
+const MAX_FRAME_MS = 100;
+
+/** Pull of this page on a limb with the crowd. */
+interface CrowdPull {
+  /** Local times of the last pull that was sent, and of the last frame. */
+  sentAt: number;
+  movedAt: number;
+  /** Values of the last target; null before the first. */
+  target: Vector3 | null;
+}
+
 /** Viewer of the session, through which limbs are pulled with the crowd. */
 export type CrowdMember = Pick<Viewer, "presence" | "pull">;
 
@@ -38,8 +54,7 @@ export class LimbController {
   readonly #stage: Stage;
   #puppeteer: Puppeteer | null = null;
   #crowdMember: CrowdMember | null = null;
-  /** Local time of the last pull of each limb that is pulled with the crowd. */
-  readonly #crowdPulls = new Map<number, number>();
+  readonly #crowdPulls = new Map<number, CrowdPull>();
   /** Index: limb number. */
   readonly #sources: (HoldSource | null)[] = Array<null>(MAX_LIMBS).fill(null);
   readonly #pullTargets: (Vector3 | null)[] = Array<null>(MAX_LIMBS).fill(null);
@@ -91,20 +106,16 @@ export class LimbController {
   }
 
   /**
-   * Claim a limb; one already held here changes its source. Return false without a session. A pointer pulls a limb that
-   * is open to the crowd with it, and does not claim it.
+   * Claim a limb; one already held here changes its source. Return false without a session. A limb that is open to the
+   * crowd is pulled with it, and not claimed.
    */
   claim(limb: number, source: HoldSource): boolean {
-    if (source === "pointer" && this.#sources[limb] === null && this.isOpen(limb)) {
-      this.#sources[limb] = source;
-      this.#crowdPulls.set(limb, -Infinity);
-      this.onChange();
-      return true;
+    if (this.#sources[limb] === null) {
+      if (this.isOpen(limb)) this.#crowdPulls.set(limb, { sentAt: -Infinity, movedAt: this.now(), target: null });
+      else if (!this.#puppeteer || this.#puppeteer.isClosed) return false;
+      else this.#puppeteer.claim(limb);
     }
-    if (!this.#puppeteer || this.#puppeteer.isClosed) return false;
-    const held = this.#sources[limb] !== null && !this.#crowdPulls.delete(limb);
     this.#sources[limb] = source;
-    if (!held) this.#puppeteer.claim(limb);
     this.onChange();
     return true;
   }
@@ -136,18 +147,8 @@ export class LimbController {
     this.#pullTargets[limb] = to.clone();
     // In the measures of the streamed figure, whichever performer is shown.
     const handleTarget = performer.toStreamedHandle(limbIndex, to, new Vector3());
-    const side = limbIndex % 2 === 0 ? "l" : "r";
     if (limbIndex < 2) this.pullHand(limb, handleTarget);
-    else {
-      const hip = positionOf(performer.joint(`${side}_hip`));
-      const angle = solveThighAngle(
-        handleTarget,
-        hip,
-        orientationOf(performer.joint("sacroiliac")),
-        jointOffset(performer, `${side}_knee`).length(),
-      );
-      this.#sendTarget(limb, angle, 0, 0);
-    }
+    else this.#sendTarget(limb, thighAngle(performer, limbIndex, handleTarget), 0, 0);
   }
 
   /** Pull the handle of a streamed figure's hand to a world position. */
@@ -155,22 +156,23 @@ export class LimbController {
     const performer = this.#stage.performers[performerOfLimb(limb)];
     if (!performer || this.#sources[limb] === null) return;
     const limbIndex = limbWithinPerformer(limb);
-    const side = limbIndex === 0 ? "l" : "r";
-    const wrist = performer.joint(`${side}_wrist`);
-    const fingers = jointTip(performer, `${side}_wrist`).applyMatrix4(wrist);
-    const tip = fingers.sub(handlePosition(performer, limbIndex, new Vector3())).add(handle);
-    const shoulder = positionOf(performer.joint(`${side}_shoulder`));
-    const chest = orientationOf(performer.joint("vl5"));
-    const { x, y, z } = toShoulderFrame(tip, shoulder, chest, armLength(performer, side));
+    const { tip, frame } = armOf(performer, limbIndex);
+    tip.sub(handlePosition(performer, limbIndex, new Vector3())).add(handle);
+    const { x, y, z } = toShoulderFrame(tip, ...frame);
     this.#sendTarget(limb, x, y, z);
   }
 
   #sendTarget(limb: number, x: number, y: number, z: number): void {
-    const pulledAt = this.#crowdPulls.get(limb);
-    if (pulledAt === undefined) this.#puppeteer?.target(limb, x, y, z);
-    else if (this.now() - pulledAt >= CROWD_PULL_INTERVAL_MS) {
+    const pull = this.#crowdPulls.get(limb);
+    if (!pull) this.#puppeteer?.target(limb, x, y, z);
+    // It was closed.
+    else if (!this.isOpen(limb)) this.onRefused(limb);
+    else {
+      pull.target = new Vector3(x, y, z);
+      pull.movedAt = this.now();
+      if (pull.movedAt - pull.sentAt < CROWD_PULL_INTERVAL_MS) return;
       this.#crowdMember?.pull(limb, x, y, z);
-      this.#crowdPulls.set(limb, this.now());
+      pull.sentAt = pull.movedAt;
     }
   }
 
@@ -182,13 +184,10 @@ export class LimbController {
     const performer = this.#stage.performers[performerOfLimb(limb)];
     const limbIndex = limbWithinPerformer(limb);
     if (!performer || limbIndex >= 2) return [];
-    const side = limbIndex === 0 ? "l" : "r";
     const handle = performer.handle(limbIndex, new Vector3());
-    const shoulder = positionOf(performer.joint(`${side}_shoulder`));
-    const chest = orientationOf(performer.joint("vl5"));
-    const tip = jointTip(performer, `${side}_wrist`).applyMatrix4(performer.joint(`${side}_wrist`));
+    const { tip, frame } = armOf(performer, limbIndex);
     return places.map((place) => {
-      const way = fromShoulderFrame(new Vector3(...place), shoulder, chest, armLength(performer, side)).sub(tip);
+      const way = fromShoulderFrame(new Vector3(...place), ...frame).sub(tip);
       return way.setLength(MIN_THREAD_M + way.length()).add(handle);
     });
   }
@@ -199,7 +198,7 @@ export class LimbController {
     if (!performer || this.#sources[limb] === null) return;
     this.#pullTargets[limb] = null;
     if (limbWithinPerformer(limb) >= 2) {
-      this.#puppeteer?.velocity(limb, up, 0, 0);
+      this.#sendVelocity(limb, performer, up, 0, 0);
       return;
     }
     const direction = this.#stage
@@ -209,7 +208,22 @@ export class LimbController {
       .addScaledVector(this.#stage.back(), nearer);
     const { x, y, z } = toChestFrame(direction, orientationOf(performer.joint("vl5")));
     // Coarse steps, so that small movements of the chest do not cause new inputs.
-    this.#puppeteer?.velocity(limb, quantise(x), quantise(y), quantise(z));
+    this.#sendVelocity(limb, performer, quantise(x), quantise(y), quantise(z));
+  }
+
+  /** Send a velocity; with the crowd, move the target of the pull, as the session moves that of a puppeteer. */
+  #sendVelocity(limb: number, performer: Performer, x: number, y: number, z: number): void {
+    const pull = this.#crowdPulls.get(limb);
+    if (!pull) {
+      this.#puppeteer?.velocity(limb, x, y, z);
+      return;
+    }
+    const limbIndex = limbWithinPerformer(limb);
+    const seconds = Math.min(this.now() - pull.movedAt, MAX_FRAME_MS) / 1000;
+    const target = pull.target ?? placeOf(performer, limbIndex);
+    if (limbIndex < 2) target.addScaledVector(new Vector3(x, y, z), seconds * HAND_SPEED).clampLength(0, 1);
+    else target.x = Math.min(MAX_THIGH_ANGLE, Math.max(MIN_THIGH_ANGLE, target.x + seconds * THIGH_SPEED * x));
+    this.#sendTarget(limb, target.x, target.y, target.z);
   }
 
   #clearLimb(limb: number): void {
@@ -231,11 +245,41 @@ function jointTip(performer: Performer, name: string): Vector3 {
   return new Vector3().fromArray(performer.figure.tips, JOINTS.indexOf(name) * 3);
 }
 
-/** Return the length of upper arm, forearm and hand to the finger tips, in metres. */
-function armLength(performer: Performer, side: string): number {
-  return (
+/** Return where a limb is, as the values of a target. */
+function placeOf(performer: Performer, limbIndex: number): Vector3 {
+  if (limbIndex < 2) {
+    const { tip, frame } = armOf(performer, limbIndex);
+    return toShoulderFrame(tip, ...frame);
+  }
+  const knee = positionOf(performer.joint(`${sideOf(limbIndex)}_knee`));
+  return new Vector3(thighAngle(performer, limbIndex, knee));
+}
+
+/** Return the angle that moves the knee to the height of `knee`, a world position. */
+function thighAngle(performer: Performer, limbIndex: number, knee: Vector3): number {
+  const side = sideOf(limbIndex);
+  const hip = positionOf(performer.joint(`${side}_hip`));
+  const thighLength = jointOffset(performer, `${side}_knee`).length();
+  return solveThighAngle(knee, hip, orientationOf(performer.joint("sacroiliac")), thighLength);
+}
+
+/** Return the finger tips in world metres, and the shoulder's frame: origin, axes, and the arm's length to the tips. */
+function armOf(
+  performer: Performer,
+  limbIndex: number,
+): { tip: Vector3; frame: [shoulder: Vector3, chest: Quaternion, armLength: number] } {
+  const side = sideOf(limbIndex);
+  const fingers = jointTip(performer, `${side}_wrist`);
+  const armLength =
     jointOffset(performer, `${side}_elbow`).length() +
     jointOffset(performer, `${side}_wrist`).length() +
-    jointTip(performer, `${side}_wrist`).length()
-  );
+    fingers.length();
+  return {
+    tip: fingers.applyMatrix4(performer.joint(`${side}_wrist`)),
+    frame: [positionOf(performer.joint(`${side}_shoulder`)), orientationOf(performer.joint("vl5")), armLength],
+  };
+}
+
+function sideOf(limbIndex: number): string {
+  return limbIndex % 2 === 0 ? "l" : "r";
 }

@@ -57,6 +57,19 @@ export interface LimbRequester {
   colour: number;
 }
 
+/** Pull of the audience on a limb that is open to it. */
+export interface LimbCrowd {
+  readonly policy: string;
+  /** Number of people who pull. */
+  readonly pulls: number;
+  /** Votes for each gesture; null if they do not decide, or are not known. */
+  readonly votes: readonly number[] | null;
+  /** True if the limb follows this page's pull, in its turn. */
+  readonly hasTurn: boolean;
+  /** True if this page pulls it. */
+  readonly isPulled: boolean;
+}
+
 /** State of one limb. */
 export interface LimbState {
   holder: LimbHolder | null;
@@ -66,6 +79,8 @@ export interface LimbState {
   requestedByMe: boolean;
   /** True if the keys and buttons of "the held string" move it. */
   selected: boolean;
+  /** Absent: the limb is not open to the audience. */
+  crowd?: LimbCrowd;
 }
 
 /** Return the requesters of each limb of `performers` performers, except `self`. */

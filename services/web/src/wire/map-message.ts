@@ -165,7 +165,8 @@ export const SERVER_MAP_FIELDS: MapFields<ServerMapName> = {
   Refusal: { limb, reason: text, holder: optional(text) },
   Notice: { limb, reason: text, detail: text },
   BondEnd: { limbs: limbPair, reason: text },
-  CrowdPulls: { limb, count, places: list(place) },
+  CrowdPulls: { limb, count, places: list(place), votes: optional(list(count)) },
+  CrowdTurn: { limb, yours: flag },
   PropRefusal: { prop, reason: text },
   Choice: { rate: count, reason: text, line: optional(count) },
 };

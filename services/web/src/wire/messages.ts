@@ -176,6 +176,8 @@ export interface CrowdPulls {
   count: number;
   /** Targets of some of them. */
   places: number[][];
+  /** Votes for each gesture of the limb; absent: the policy is not `vote`. */
+  votes: number[] | null;
 }
 
 /** A prop is not put where this puppeteer wanted it. */
@@ -185,6 +187,15 @@ export interface PropRefusal {
   prop: number;
   /** A reason of proto/messages.md, 3.7. */
   reason: string;
+}
+
+/** Begin or end of this viewer's turn to move a limb that is open to the crowd. */
+export interface CrowdTurn {
+  name: "CrowdTurn";
+  /** Limb l of performer k has number 4 k + l. */
+  limb: number;
+  /** True: the limb follows this viewer's pull. */
+  yours: boolean;
 }
 
 /** Clock request. It has the size of the answer, so that both directions take equally long to transmit. */
@@ -336,7 +347,8 @@ export type ServerMessage =
   | Live
   | BondEnd
   | CrowdPulls
-  | PropRefusal;
+  | PropRefusal
+  | CrowdTurn;
 
 export type ClientMessage = Ping | Edit | Report | Claim | Release | Alive | Input | Ask | Sample | Bond | Pull | Put;
 
@@ -361,6 +373,7 @@ export const MESSAGE_TYPES: Readonly<Record<Message["name"], number>> = {
   BondEnd: 16,
   CrowdPulls: 17,
   PropRefusal: 18,
+  CrowdTurn: 19,
   Ping: 64,
   Edit: 65,
   Report: 66,

@@ -22,6 +22,7 @@ const DEFERRED_FILES = [
   // what the props on the stage share with their controls
   /\/props-/,
   /edge-smoothing-/,
+  /crowd-(status|text)-/,
   // what the solver of limbs shares with that of bonds
   /point-/,
 ];

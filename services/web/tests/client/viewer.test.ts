@@ -38,11 +38,24 @@ describe("crowd", () => {
     ]);
     let changes = 0;
     viewer.addEventListener("pulls", () => changes++);
-    const pulls = { name: "CrowdPulls", limb: 1, count: 2, places: [[0.5, 0, 0]] } as const;
+    const pulls = { name: "CrowdPulls", limb: 1, count: 2, places: [[0.5, 0, 0]], votes: null } as const;
     FakeWebSocket.last.receive({ ...pulls, places: [[0.5, 0, 0]] });
     expect(viewer.crowdPulls.get(1)).toEqual(pulls);
-    FakeWebSocket.last.receive({ name: "CrowdPulls", limb: 1, count: 0, places: [] });
+    FakeWebSocket.last.receive({ name: "CrowdPulls", limb: 1, count: 0, places: [], votes: null });
     expect([viewer.crowdPulls.size, changes]).toEqual([0, 2]);
+  });
+
+  test("turns of this viewer are known until they end or the connection is lost", () => {
+    createViewer();
+    FakeWebSocket.last.accept();
+    FakeWebSocket.last.receive({ name: "CrowdTurn", limb: 1, yours: true });
+    FakeWebSocket.last.receive({ name: "CrowdTurn", limb: 5, yours: true });
+    FakeWebSocket.last.receive({ name: "CrowdTurn", limb: 1, yours: false });
+    expect([...viewer.crowdTurns]).toEqual([5]);
+    FakeWebSocket.last.endWith(1006);
+    advanceTime(250);
+    FakeWebSocket.last.accept();
+    expect(viewer.crowdTurns.size).toBe(0);
   });
 });
 

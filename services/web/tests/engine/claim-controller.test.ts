@@ -53,7 +53,7 @@ beforeEach(() => {
   hands = createLimbController(createStandingPuppet(), puppeteer as unknown as FakePuppeteer);
   velocity = new VelocityInputs(hands, {
     claim: (limb) => controller.claim(limb, "velocity"),
-    isFree: (limb) => controller.isFree(limb),
+    isFree: (limb) => controller.canPull(limb),
     selection: controller.selectedPerformer,
   });
   hands.onChange = () => controller.render();
@@ -118,7 +118,60 @@ test("limb that is open to the audience can be pulled by viewers too, and is not
   hands.claim(LEFT_HAND, "pointer");
   expect(controller.limbStates()[LEFT_HAND].holder?.name).toBe("The audience");
   hands.release(LEFT_HAND);
-  expect(control.messagesOf("Claim")).toEqual([]);
+  controller.toggleClaim(LEFT_HAND);
+  expect([hands.isCrowdPull(LEFT_HAND), velocity.selectedLimb]).toEqual([true, LEFT_HAND]);
+  controller.toggleClaim(LEFT_HAND);
+  expect(hands.source(LEFT_HAND)).toBe(null);
+  expect([control.messagesOf("Claim"), toasts]).toEqual([[], []]);
+  controller.toggleClaim(RIGHT_HAND);
+  expect([hands.source(RIGHT_HAND), toasts.map(([message]) => message)]).toEqual([
+    null,
+    ["With this link you pull only what is open to the audience"],
+  ]);
+});
+
+test("audience of an open limb is shown with its votes and this page's turn", () => {
+  sendPresence([null, null, null, null]);
+  expect(controller.limbStates()[LEFT_HAND].crowd).toBe(undefined);
+  stream.receive(
+    {
+      name: "Presence",
+      live: null,
+      bonds: null,
+      props: null,
+      crowd: [{ limb: LEFT_HAND, policy: "vote", pulls: 3 }],
+      viewers: 2,
+      puppeteers: [],
+      limbs: ["crowd", null, null, null],
+      asks: [[], [], [], []],
+    },
+    { name: "CrowdPulls", limb: LEFT_HAND, count: 3, places: [[0, 1, 0]], votes: [3, 0, 0, 0, 0] },
+    { name: "CrowdTurn", limb: LEFT_HAND, yours: true },
+  );
+  expect(shown[LEFT_HAND].crowd).toEqual({
+    policy: "vote",
+    pulls: 3,
+    votes: [3, 0, 0, 0, 0],
+    hasTurn: true,
+    isPulled: false,
+  });
+});
+
+test("a hand that is pulled with the audience cannot be joined with another", () => {
+  stream.receive({
+    name: "Presence",
+    live: null,
+    bonds: null,
+    props: null,
+    crowd: [{ limb: LEFT_HAND, policy: "median", pulls: 0 }],
+    viewers: 2,
+    puppeteers: [],
+    limbs: [null, null, null, null],
+    asks: [[], [], [], []],
+  });
+  velocity.hold(LEFT_HAND);
+  controller.joinHands();
+  expect([toasts.at(-1)?.[0], control.messagesOf("Bond")]).toEqual(["Hold a hand, then join it with another", []]);
 });
 
 describe("limb held by another user", () => {

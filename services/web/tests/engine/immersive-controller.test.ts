@@ -45,7 +45,7 @@ beforeEach(() => {
     get viewOnly() {
       return viewOnly;
     },
-    isFree: () => true,
+    canPull: () => true,
     limbStates: () => [],
     selectedPerformer: new PerformerSelection(),
   };

@@ -1,6 +1,7 @@
 import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import { BodyInput, type BodyMessage, type HandReach } from "../../src/input/body-input";
+import type { CrowdMember } from "../../src/input/limb-controller";
 import { PerformerSelection } from "../../src/input/performer-selection";
 import { jointPosition, LEFT_FINGER_TIP } from "../../src/stage/puppet/standard-figure";
 import { createStandingPuppet } from "../stage/puppet/figures";
@@ -33,7 +34,7 @@ class Stage {
           if (this.othersLimbs.has(limb)) this.refused.push(limb);
           return !this.othersLimbs.has(limb) && this.limbs.claim(limb, source);
         },
-        isFree: (limb) => !this.othersLimbs.has(limb) && this.limbs.source(limb) === null,
+        canPull: (limb) => !this.othersLimbs.has(limb) && this.limbs.source(limb) === null,
         selectedPerformer: this.selection,
       },
       { performers: this.puppets, back: () => new Vector3(0, 0, this.isFacing ? 1 : -1) },
@@ -225,4 +226,17 @@ describe("reach", () => {
     expect(left[0]).toBeGreaterThan(0.4);
     [-right[0], right[1], right[2]].forEach((value, axis) => void expect(value).toBeCloseTo(left[axis], 6));
   });
+});
+
+test("a hand that is open to the crowd is pulled with it, and not claimed", () => {
+  const stage = new Stage();
+  const pulls: number[] = [];
+  stage.limbs.crowdMember = {
+    presence: { limbs: [null, "crowd", null, null], crowd: [{ limb: RIGHT_HAND, policy: "median", pulls: 2 }] },
+    pull: (limb: number) => pulls.push(limb) > 0,
+  } as unknown as CrowdMember;
+  stage.show({ left: OUT });
+  expect([stage.held, stage.limbs.isCrowdPull(RIGHT_HAND), pulls]).toEqual([[RIGHT_HAND], true, [RIGHT_HAND]]);
+  stage.show({});
+  expect([stage.held, stage.session.calls]).toEqual([[], []]);
 });

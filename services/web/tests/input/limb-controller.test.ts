@@ -161,17 +161,60 @@ describe("limb that is open to the crowd", () => {
     expect(session.calls).toEqual([]);
   });
 
-  test("a viewer without a puppeteer pulls it, and keys claim it", () => {
+  test.each(["pointer", "velocity", "camera"] as const)("a viewer without a puppeteer pulls it by %s", (source) => {
     const { member } = createMember(null);
-    const viewerOnly = createLimbController(createStandingPuppet(), null);
-    viewerOnly.crowdMember = member;
-    expect([viewerOnly.claim(LEFT_HAND, "velocity"), viewerOnly.claim(LEFT_HAND, "pointer")]).toEqual([false, true]);
+    const limbController = createLimbController(createStandingPuppet(), null);
+    limbController.crowdMember = member;
+    expect([limbController.claim(LEFT_HAND, source), limbController.claim(RIGHT_LEG, source)]).toEqual([true, false]);
+    expect([limbController.source(LEFT_HAND), limbController.isCrowdPull(LEFT_HAND)]).toEqual([source, true]);
+  });
+
+  test("keys move the target from where the hand is, and go on from a pointer's", () => {
+    let now = 0;
     const session = new FakePuppeteer();
-    const limbController = createLimbController(createStandingPuppet(), session);
+    const limbController = createLimbController(createStandingPuppet(), session, () => now);
+    const { pulls, member } = createMember(null);
+    limbController.crowdMember = member;
+    limbController.claim(LEFT_HAND, "velocity");
+    for (; now < 500; now += 10) limbController.move(LEFT_HAND, 0, 1, 0);
+    const at = LEFT_FINGER_TIP.clone().sub(jointPosition("l_shoulder")).divideScalar(ARM);
+    expect(pulls.length).toBe(10);
+    expectClose(pulls[0].slice(1), [...at]);
+    // One arm length per second.
+    expectClose(pulls[9].slice(1), [at.x, at.y + 0.45, at.z]);
+    limbController.claim(LEFT_HAND, "pointer");
+    limbController.pullTo(LEFT_HAND, new Vector3(0.5, 1.5, 0.2));
+    const pulled = pulls[pulls.length - 1];
+    limbController.claim(LEFT_HAND, "velocity");
+    now += 60;
+    limbController.move(LEFT_HAND, 0, 0, 0);
+    expectClose(pulls[pulls.length - 1], pulled);
+    expect(session.calls).toEqual([]);
+  });
+
+  test("keys keep a thigh within its range", () => {
+    let now = 0;
+    const limbController = createLimbController(createStandingPuppet(), null, () => now);
+    const pulls: number[] = [];
+    const presence = { limbs: [null, null, null, null], crowd: [{ limb: RIGHT_LEG, policy: "turns", pulls: 0 }] };
+    const pull = (_: number, angle: number) => pulls.push(angle) > 0;
+    limbController.crowdMember = { presence, pull } as unknown as CrowdMember;
+    limbController.claim(RIGHT_LEG, "velocity");
+    for (; now < 3_000; now += 20) limbController.move(RIGHT_LEG, 0, 1, 0);
+    expect(pulls[0]).toBeLessThan(0.2);
+    expect(pulls[pulls.length - 1]).toBeCloseTo((2 * Math.PI) / 3, 6);
+    for (; now < 6_000; now += 20) limbController.move(RIGHT_LEG, 0, -1, 0);
+    expect(pulls[pulls.length - 1]).toBeCloseTo(-Math.PI / 4, 6);
+  });
+
+  test("a pull ends when the limb is closed", () => {
+    const limbController = createLimbController(createStandingPuppet(), null);
+    const { member } = createMember(null);
     limbController.crowdMember = member;
     limbController.claim(LEFT_HAND, "pointer");
-    limbController.claim(LEFT_HAND, "velocity");
-    expect([session.takeCalls(), limbController.isCrowdPull(LEFT_HAND)]).toEqual([[["claim", LEFT_HAND]], false]);
+    (member as { presence: { crowd: unknown } }).presence.crowd = null;
+    limbController.pullTo(LEFT_HAND, new Vector3(0.5, 1.5, 0.2));
+    expect([limbController.source(LEFT_HAND), limbController.isCrowdPull(LEFT_HAND)]).toEqual([null, false]);
   });
 
   test("while a puppeteer holds it, it is not open", () => {

@@ -2,9 +2,10 @@
 import { pageTranslator, type Translator } from "../../i18n/translator";
 import { LIMBS } from "../../motion/skeleton";
 import type { ScreenBox } from "../../stage/camera/screen-box";
-import { MAX_LIMBS } from "../../wire/limbs";
+import { CROWD, MAX_LIMBS } from "../../wire/limbs";
 import { element, setAttribute, setText } from "../dom";
 import { initialOf } from "../format";
+import { holderColour } from "../limb-display";
 import { type LimbHolder, type LimbState, limbName } from "../limb-state";
 import type { LabelMetrics, LabelPosition, LabelPositions } from "./label-layout";
 import type { Size } from "./tag-layout";
@@ -144,8 +145,8 @@ class NameTag {
     // The performer is not named: the string shows it.
     const { translate } = this.translator;
     setText(this.#limbText, requestedByMe ? translate("asked") : limbName(this.limb, 1, this.translator));
-    this.#askButton.hidden = holder.mine || requestedByMe;
-    this.#root.style.setProperty("--colour", `var(--holder-${holder.colour})`);
+    this.#askButton.hidden = holder.mine || requestedByMe || holder.id === CROWD;
+    this.#root.style.setProperty("--colour", holderColour(holder));
     return true;
   }
 

@@ -4,6 +4,7 @@
 import { joinList, pageTranslator, translate } from "../../i18n/translator";
 import { limbNumber } from "../../wire/limbs";
 import { element, setAttribute } from "../dom";
+import { holderColour } from "../limb-display";
 import { LIMB_NAMES, LIMB_ORDER, type LimbState, performerCount } from "../limb-state";
 
 export interface PerformerChooser {
@@ -39,7 +40,7 @@ export function createPerformerChooser(onChoose: (performer: number) => void): P
         if (button.hidden) return;
         const holders = LIMB_ORDER.map((part) => ({ part, holder: limbs[limbNumber(performer, part)].holder }));
         holders.forEach(({ holder }, i) =>
-          setAttribute(dots[i], "style", holder && `--colour: var(--holder-${holder.colour})`),
+          setAttribute(dots[i], "style", holder && `--colour: ${holderColour(holder)}`),
         );
         const limbTexts = holders.flatMap(({ part, holder }) =>
           holder

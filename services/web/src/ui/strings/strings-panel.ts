@@ -3,8 +3,10 @@ import { translate, translateToParts } from "../../i18n/translator";
 import type { DigitalInput } from "../../input/digital-input";
 import { isHand, limbNumber } from "../../wire/limbs";
 import type { PropPresence } from "../../wire/messages";
+import type { CrowdActions, CrowdControls } from "../crowd/crowd-controls";
 import { element, setAttribute, setText } from "../dom";
 import { limbIcon } from "../icon";
+import { holderColour, isPulledHere, limbButtonName, openCrowd } from "../limb-display";
 import {
   LIMB_NAMES,
   LIMB_ORDER,
@@ -54,6 +56,8 @@ export interface StringsActions {
   useCamera(onChange: (isOn: boolean) => void): Promise<void>;
   /** Omitted if this page may not change the session. */
   props?: PropActions;
+  /** Actions of the controls of the audience. Omitted if this page may not open limbs. */
+  crowd?: CrowdActions;
 }
 
 /** Action of a limb's button. */
@@ -104,15 +108,19 @@ export function createStringsPanel(
     };
     const render = (limbState: LimbState, ready: boolean) => {
       const { holder, selected } = limbState;
-      const mine = holder?.mine ?? false;
+      const crowd = openCrowd(limbState);
+      const mine = isPulledHere(limbState);
       setAttribute(row, "style", holderStyle(holder));
       const name = { limb: limbName(limbOf(limb), performers) };
       setText(state, limbStatus(limbState));
-      if (!holder)
+      if (!holder || crowd)
         state.append(element("span", { class: "key-hint" }, translate(", key {key}", { key: limbKey(limb) })));
       action = limbAction(limbState);
-      const label =
-        action === "toggle"
+      const label = crowd
+        ? mine
+          ? "Let go"
+          : "Pull"
+        : action === "toggle"
           ? holder
             ? "Release"
             : "Take"
@@ -166,6 +174,8 @@ export function createStringsPanel(
   let props: readonly PropPresence[] = [];
   let isReady = false;
   const renderProps = () => propSection?.render(props, performers, isReady);
+  let crowdControls: CrowdControls | null = null;
+  let renderControls = () => {};
   const chooser = createPerformerChooser(actions.dancer);
   const next = createNextPerformerButton(actions.nextDancer);
   panel.body.append(
@@ -189,9 +199,14 @@ export function createStringsPanel(
     dock,
     load() {
       loading ??= import("./strings-controls").then(
-        ({ createCameraButton, createDirectionPad, createPropSection }) => {
+        ({ createCameraButton, createCrowdControls, createDirectionPad, createPropSection }) => {
           for (const { limb, setPad } of rows) setPad(createDirectionPad(limb, actions.press));
           keys.before(createCameraButton(actions.useCamera));
+          if (actions.crowd) {
+            crowdControls = createCrowdControls(actions.crowd);
+            panel.body.append(crowdControls.element);
+            renderControls();
+          }
           if (!actions.props) return;
           propSection = createPropSection(actions.props);
           panel.body.append(propSection.element);
@@ -219,25 +234,16 @@ export function createStringsPanel(
       renderProps();
       for (const part of [chooser, next]) part.render(limbs, selected);
       for (const { limb, render } of rows) render(limbs[limbOf(limb)], ready);
+      renderControls = () => crowdControls?.render(limbs, ready, selected);
+      renderControls();
       // Only with a hand of one's own, so that the sheet of a phone leaves room for the performer's feet.
       join.hidden = !ready || !limbs.some(({ holder }, limb) => holder?.mine && isHand(limb));
       for (const { limb, disc, name } of discs) {
-        const { holder, requestedByMe } = limbs[limbOf(limb)];
-        const lowerName = limbName(limbOf(limb), performers);
-        const capitalName = lowerName.charAt(0).toUpperCase() + lowerName.slice(1);
+        const state = limbs[limbOf(limb)];
+        const { holder } = state;
         setAttribute(disc, "style", holderStyle(holder));
-        setAttribute(disc, "data-mine", holder?.mine ?? false);
-        disc.setAttribute(
-          "aria-label",
-          !holder
-            ? translate("Take the {limb}", { limb: lowerName })
-            : holder.mine
-              ? translate("Release the {limb}, held by you", { limb: lowerName })
-              : translate(requestedByMe ? "{limb}, held by {name}, asked for" : "{limb}, held by {name}", {
-                  limb: capitalName,
-                  name: holder.name,
-                }),
-        );
+        setAttribute(disc, "data-mine", isPulledHere(state));
+        disc.setAttribute("aria-label", limbButtonName(state, limbName(limbOf(limb), performers)));
         disc.disabled = !ready;
         name.hidden = !holder;
         setText(name, holder?.name ?? "");
@@ -252,19 +258,25 @@ const ACTION_LABELS = {
   Give: "Give {limb}",
   Ask: "Ask for {limb}",
   Withdraw: "Withdraw the request for {limb}",
+  Pull: "Pull {limb}",
+  "Let go": "Let go of {limb}",
 } as const;
 
 function holderStyle(holder: LimbHolder | null): string | null {
-  return holder ? `--colour: var(--holder-${holder.colour})` : null;
+  return holder ? `--colour: ${holderColour(holder)}` : null;
 }
 
-function limbAction({ holder, requesters, requestedByMe }: LimbState): LimbAction {
-  if (!holder) return "toggle";
+function limbAction(state: LimbState): LimbAction {
+  const { holder, requesters, requestedByMe } = state;
+  if (!holder || openCrowd(state)) return "toggle";
   if (holder.mine) return requesters.length > 0 ? "give" : "toggle";
   return requestedByMe ? "withdraw" : "ask";
 }
 
-function limbStatus({ holder, requesters, requestedByMe }: LimbState): string {
+function limbStatus(state: LimbState): string {
+  const { holder, requesters, requestedByMe } = state;
+  const crowd = openCrowd(state);
+  if (crowd) return crowd.isPulled ? translate("You pull this") : translate("Open to all");
   if (!holder) return translate("Free");
   if (holder.mine)
     return requesters.length > 0
