@@ -34,3 +34,14 @@ test("bones are rows of matrices into the view, and the face's are columns of it
   ]);
   expect(lightTable.value).toBe(table);
 });
+
+test("colours are displayed as sRGB, within one percent", () => {
+  const { fragmentShader } = new SimpleFigureMaterial({ face: new Texture(), asanoha: new Texture() }, "face");
+  const [, root, fourthRoot, linear] = (
+    /= ([\d.]+) \* root - ([\d.]+) \* sqrt\(root\) - ([\d.]+) \* gl_FragColor/.exec(fragmentShader) ?? []
+  ).map(Number);
+  for (let share = 0; share <= 1; share += 1 / 256) {
+    const shown = share <= 0.0031308 ? 12.92 * share : 1.055 * share ** (1 / 2.4) - 0.055;
+    expect(Math.abs(root * share ** 0.5 - fourthRoot * share ** 0.25 - linear * share - shown)).toBeLessThan(0.01);
+  }
+});
