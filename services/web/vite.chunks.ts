@@ -14,6 +14,7 @@ const STAGE = "src/engine/stage-chunk.ts";
 const MESH = "src/stage/puppet/puppet-geometry.ts";
 const MESH_MODULES = new RegExp(
   [
+    "/src/stage/rendering/triangle-order",
     "/src/stage/puppet/(parts/|hand/finger-joints|puppet-geometry|geometry-builder|surface|figure-fit|standard-figure)",
     "/three/src/(math/(Vector|Matrix|Quaternion|Color)|core/Buffer|extras/(core/Curve|curves/CatmullRom))",
   ].join("|"),

@@ -40,15 +40,53 @@ const INSTALLER = /\/src\/immersive\/complete-renderer\.ts$/;
 
 /**
  * Methods that the page never calls: three.js's own file format, picking, which the page does by the positions of the
- * handles, tangents, and the renderer's copies of textures and pixels.
+ * handles, and what custom scenes, cameras and curves would use. The page's scripts contain none of these names.
  */
-const UNUSED_METHOD = /^\t(?:toJSON|fromJSON|raycast|computeTangents)\([^)]*\) \{\n.*?^\t\}\n/gms;
-const UNUSED_RENDERER_METHOD =
-  /^\t\tthis\.(?:readRenderTargetPixels(?:Async)?|copyTextureToTexture) = (?:async )?function \([^)]*\) \{\n.*?^\t\t\};\n/gms;
+const UNUSED_METHODS = `
+  toJSON fromJSON raycast
+  addColors addScalar clampLength clampScalar manhattanDistanceTo multiplyVectors randomDirection rotateAround roundToZero
+  setFromColor setFromCylindrical setFromCylindricalCoords setFromMatrixScale setFromMatrix3Column setFromSpherical
+  setFromSphericalCoords subScalar transformUv
+  multiplyQuaternionsFlat rotateTowards setFromVector3 setAxisAngleFromQuaternion setAxisAngleFromRotationMatrix
+  slerpQuaternions
+  extractBasis makeRotationAxis makeRotationX makeShear setFromMatrix3 transposeIntoArray
+  getHex getHexString getHSL getStyle lerpHSL offsetHSL
+  containsBox expandByScalar intersectsBox intersectsTriangle setFromCenterAndSize setFromObject
+  closestPointToPoint distanceToSphere getArea getBoundingBox getBoundingSphere getMidpoint getPlane intersectBox
+  intersectLine intersectsLine intersectSphere projectPoint recast setFromAttributeAndIndices setFromCoplanarPoints
+  setFromPointsAndIndices
+  computeTangents computeVertexNormals getIndirect normalizeNormals setIndirect addLayerUpdate addUpdateRange copyAt
+  computeFrenetFrames getPoints getSpacedPoints updateArcLengths
+  getObjectById rotateOnWorldAxis rotateX setRotationFromAxisAngle setRotationFromEuler setRotationFromMatrix
+  setRotationFromQuaternion translateY translateZ
+  clearViewOffset getEffectiveFOV getFilmHeight getFocalLength getViewBounds getViewSize setFocalLength
+  getColorAt getMorphAt setColorAt setMorphAt _computeIntersections
+  compileCubemapShader compileEquirectangularShader _compileMaterial`
+  .trim()
+  .split(/\s+/);
+/** Copies of textures and pixels that the page never makes. */
+const UNUSED_RENDERER_METHODS = ["readRenderTargetPixels", "readRenderTargetPixelsAsync", "copyTextureToTexture"];
 
-/** Remove the unused methods of the classes in a module of three.js. */
+/** Names of which the page's scripts contain none. */
+export const UNUSED_NAMES: readonly string[] = [...UNUSED_METHODS, ...UNUSED_RENDERER_METHODS];
+
+const UNUSED_METHOD = new RegExp(
+  `^\\t(?:static )?(?:${UNUSED_METHODS.join("|")})\\([^)]*\\) \\{(?:\\n.*?^\\t)?\\}\\n`,
+  "gms",
+);
+const UNUSED_RENDERER_METHOD = new RegExp(
+  `^\\t\\tthis\\.(?:${UNUSED_RENDERER_METHODS.join("|")}) = (?:async )?function \\([^)]*\\) \\{\\n.*?^\\t\\t\\};\\n`,
+  "gms",
+);
+/** Table of the CSS names of colours; the page's colours are numbers. */
+const COLOUR_NAMES = /^const _colorKeywords = \{.*?\};$/ms;
+
+/** Remove the unused methods of the classes in a module of three.js, and the names of colours. */
 export function removeUnusedMethods(code: string): string {
-  return code.replace(UNUSED_METHOD, "").replace(UNUSED_RENDERER_METHOD, "");
+  return code
+    .replace(UNUSED_METHOD, "")
+    .replace(UNUSED_RENDERER_METHOD, "")
+    .replace(COLOUR_NAMES, "const _colorKeywords = {};");
 }
 
 /** Replaces `REPLACED_MODULES`, and removes unused methods. */
@@ -66,7 +104,7 @@ export const reducedRenderer: Plugin = {
     },
   },
   transform: {
-    filter: { id: /\/three\/src\/.*\.js$/, code: /\b(?:toJSON|fromJSON|raycast)\(|copyTextureToTexture = / },
+    filter: { id: /\/three\/src\/.*\.js$/ },
     handler: removeUnusedMethods,
   },
 };

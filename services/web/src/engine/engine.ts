@@ -15,7 +15,7 @@ import { type Graphics, openGraphics } from "../stage/rendering/graphics";
 import { LabelLayout, NO_LABELS } from "../ui/strings/label-layout";
 import { AvatarModels } from "./avatar-models";
 import { changedParts } from "./changed-parts";
-import { ClaimController } from "./claim-controller";
+import { ClaimController, type ClaimState } from "./claim-controller";
 import { FrameLoop } from "./frame-loop";
 import type { ImmersiveController } from "./immersive-controller";
 import type {
@@ -69,6 +69,8 @@ export class Engine {
   #isImmersive = false;
   #immersive: ImmersiveController | null = null;
   #lastState: StageState | null = null;
+  /** State of the limbs that the page has; null if it has to render its own again. */
+  #lastClaims: ClaimState | null = null;
   #lastPosition = NaN;
 
   /**
@@ -87,7 +89,7 @@ export class Engine {
     this.#access.onUnauthorized(({ title, detail, hint }) => send({ type: "unauthorized", title, detail, hint }));
     this.#claims = new ClaimController(
       {
-        render: (state) => send({ type: "limbs", state }),
+        render: (state) => this.#sendClaims(state),
         toast: (message, ask) => send({ type: "toast", message, ask: ask ?? null }),
         notice: (text) => send({ type: "limb notice", text }),
       },
@@ -243,7 +245,11 @@ export class Engine {
   }
 
   #applySettings({ theme, reducedMotion, mapping, viewport, labels }: Partial<EngineSettings>): void {
-    if (mapping) this.#claims.render();
+    if (mapping) {
+      // The page shows the keys of the limbs.
+      this.#lastClaims = null;
+      this.#claims.render();
+    }
     if (labels) this.#labels.metrics = labels;
     const stage = this.#controller?.stage;
     if (!stage) return;
@@ -323,6 +329,12 @@ export class Engine {
     this.#immersive ??= new chunk.ImmersiveController(this.#controller, this.#claims, this.#settings);
     const frame = this.#immersive.advance(performance.now(), hands);
     if (frame) this.send({ type: "immersive", frame });
+  }
+
+  /** Send the state of the limbs if it has changed: several events lead to the same one. */
+  #sendClaims(state: ClaimState): void {
+    if (changedParts(this.#lastClaims, state)) this.send({ type: "limbs", state });
+    this.#lastClaims = state;
   }
 
   /** Send what has changed since the last frame. */

@@ -50,14 +50,14 @@ test("time runs on between the engine's messages", () => {
   expect([playback.position, playback.ownTime(120), playback.isClockSettled]).toEqual([2.5, 5_020_000, true]);
 });
 
-test("the time of the sound is sent while there is sound, and its end once", () => {
+test("the time of the sound is sent at intervals while there is sound, and its end once", () => {
   const { playback, commands } = openPlayback();
   playback.sendLead(0);
-  playback.leader = (now) => (now < 30 ? { time: now * 1000, run: 1 } : null);
-  for (const now of [10, 20, 30, 40]) playback.sendLead(now);
+  playback.leader = (now) => (now < 100 ? { time: now * 1000, run: 1 } : null);
+  for (const now of [10, 20, 50, 65, 90, 110, 120, 180]) playback.sendLead(now);
   expect(commands).toEqual([
     { type: "lead", lead: { time: 10_000, run: 1, at: 10 } },
-    { type: "lead", lead: { time: 20_000, run: 1, at: 20 } },
+    { type: "lead", lead: { time: 65_000, run: 1, at: 65 } },
     { type: "lead", lead: null },
   ]);
 });

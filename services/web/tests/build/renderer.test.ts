@@ -1,8 +1,9 @@
 /** Modules of three.js's renderer that the build of the page replaces. */
 import { globSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
+import { build, type Rolldown } from "vite";
 import { expect, test } from "vitest";
-import { REPLACED_MODULES, removeUnusedMethods } from "../../vite.renderer.ts";
+import { REPLACED_MODULES, removeUnusedMethods, UNUSED_NAMES } from "../../vite.renderer.ts";
 
 const SOURCES = resolve(import.meta.dirname, "../../node_modules/three/src");
 /** Members that the renderer uses only while a session is presented, in the present version of three.js. */
@@ -55,27 +56,37 @@ test("the replaced groups of uniforms have what the renderer uses without groups
   expect([...used].filter((member) => !(member in groups)).sort()).toEqual(["bind", "update"]);
 });
 
-const UNUSED_CALL = /\.(toJSON|fromJSON|raycast|computeTangents|readRenderTargetPixels\w*|copyTextureToTexture)\(/g;
-
-test("methods that are removed as unused are called by none of the others", () => {
-  // Loaders of three.js's own format and classes for picking are not part of the page.
-  const files = globSync(
-    "{core,cameras,lights,materials,math,objects,renderers,renderers/webgl,scenes,textures}/*.js",
-    {
-      cwd: SOURCES,
-    },
-  );
+test("methods and functions are removed as a whole", () => {
+  const files = globSync("{core,cameras,extras/core,lights,materials,math,objects,renderers,textures}/*.js", {
+    cwd: SOURCES,
+  });
   expect(files.length).toBeGreaterThan(100);
   let removedBytes = 0;
   for (const file of files) {
     const code = read(file);
     const reduced = removeUnusedMethods(code);
     removedBytes += code.length - reduced.length;
-    const calls = reduced.replace(/\/\*.*?\*\//gs, "").match(UNUSED_CALL) ?? [];
-    expect([file, calls]).toEqual([file, file === "core/Raycaster.js" ? [".raycast("] : []]);
-    // Whole methods only: the number of open blocks stays even.
     const count = (character: string) => reduced.split(character).length - code.split(character).length;
     expect([file, count("{")]).toEqual([file, count("}")]);
   }
-  expect(removedBytes).toBeGreaterThan(55_000);
+  expect(removedBytes).toBeGreaterThan(100_000);
+});
+
+test("no script of the page contains the name of a removed method or of a colour", async () => {
+  const web = resolve(import.meta.dirname, "../..");
+  const options = { write: false, emptyOutDir: false, minify: false } as const;
+  const { output } = (await build({ root: web, logLevel: "error", build: options })) as Rolldown.RolldownOutput;
+  const code = output.map((file) => (file.type === "chunk" ? file.code : "")).join("\n");
+  const withoutComments = code.replace(/\/\*.*?\*\/|^\s*\/\/[^\n]*/gms, "");
+  const words = new Set(withoutComments.match(/[\w$]+/g));
+  expect(words).toContain("WebGLRenderer");
+  expect(UNUSED_NAMES.filter((name) => words.has(name))).toEqual([]);
+  // Materials of avatars and the stage have their colours as numbers.
+  const [, names = ""] = /_colorKeywords = \{(.*?)\}/s.exec(read("math/Color.js")) ?? [];
+  const colours = Array.from(names.matchAll(/'(\w+)'/g), ([, name]) => name);
+  expect(colours.length).toBeGreaterThan(100);
+  const passed = new Set(
+    Array.from(withoutComments.matchAll(/(?:Color\(|\bcolor: |\.set\() ?["'](\w+)["']/g), ([, name]) => name),
+  );
+  expect(colours.filter((name) => passed.has(name))).toEqual([]);
 });

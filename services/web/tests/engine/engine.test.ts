@@ -165,6 +165,31 @@ test("edits that the server rejects are reported", async () => {
   expect(eventsOf("edit failed")[0].problem).toEqual({ title: "No", detail: "not now" });
 });
 
+test("the state of the limbs is sent when it changes, and with a mapping, whose keys the page shows", () => {
+  const { stream, control } = openSession();
+  control.receive({ name: "Welcome", id: "a", colour: 0, lead: 100_000 });
+  stream.receive(header(), description(), timeline());
+  const receivePresence = (viewers: number, holder: string | null) =>
+    stream.receive({
+      name: "Presence",
+      live: null,
+      bonds: null,
+      crowd: null,
+      props: null,
+      viewers,
+      puppeteers: PEOPLE,
+      limbs: [null, holder, null, null],
+      asks: [[], [], [], []],
+    });
+  receivePresence(2, "m");
+  events.length = 0;
+  receivePresence(3, "m");
+  expect(eventsOf("limbs")).toEqual([]);
+  receivePresence(3, null);
+  engine.handle({ type: "set", settings: { mapping: DEFAULT_MAPPING } });
+  expect(eventsOf("limbs").map(({ state }) => state.limbs[1].holder)).toEqual([null, null]);
+});
+
 test("a rejected token is reported, and limbs are not offered to viewers", async () => {
   const body = btoa(JSON.stringify({ role: "view" }));
   vi.stubGlobal("fetch", async () => new Response('{"title": "Expired", "detail": "the link"}', { status: 401 }));

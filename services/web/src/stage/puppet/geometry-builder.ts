@@ -1,5 +1,6 @@
 /** Builder that joins the puppet's parts into one skinned geometry. */
 import { BufferGeometry, Color, Float32BufferAttribute, Uint16BufferAttribute, Vector3 } from "three";
+import { orderTriangles } from "../rendering/triangle-order";
 import { type Finish, MATERIAL_PARTS, PATTERN } from "./finish";
 import { HEAD_CENTRE } from "./standard-figure";
 import type { Detail, Surface, SurfaceMesh } from "./surface";
@@ -88,7 +89,9 @@ export class GeometryBuilder {
     geometry.setAttribute("pattern", new Float32BufferAttribute(this.#patterns, 3));
     geometry.setAttribute("skinIndex", new Uint16BufferAttribute(this.#skinIndices, 4));
     geometry.setAttribute("skinWeight", new Float32BufferAttribute(this.#skinWeights, 4));
-    geometry.setIndex(this.#indices.flat());
+    // The coarse detail is that of software rendering.
+    const indices = this.#detail === "coarse" ? this.#indices.map(orderTriangles) : this.#indices;
+    geometry.setIndex(indices.flat());
     let start = 0;
     this.#indices.forEach(({ length }, part) => {
       geometry.addGroup(start, length, part);

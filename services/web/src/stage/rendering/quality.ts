@@ -54,8 +54,13 @@ const SLOW = 1.25;
  * a frame which is not slow suffices: only the trial shows if the machine was slow for a while.
  */
 const FAST = 1.11;
-/** Frames per median; few, since slow frames are also rare. */
+/** Least frames per median; few, since slow frames are also rare. */
 const WINDOW_FRAMES = 6;
+/**
+ * Least duration of the frames per median in software, in seconds: there the same processors decode, run scripts and
+ * draw the page, which takes some frames in a row the time of two.
+ */
+const SOFTWARE_WINDOW_S = 2;
 /**
  * A single frame this slow reduces the quality, in seconds. An even longer one is a page in the background or a
  * suspended machine.
@@ -124,11 +129,12 @@ export class AdaptiveQuality {
       return false;
     }
     this.#frameTimes.push(seconds);
-    if (this.#frameTimes.length < WINDOW_FRAMES && seconds < VERY_SLOW_FRAME_S) return false;
     const sorted = [...this.#frameTimes].sort((a, b) => a - b);
     const windowS = sorted.reduce((sum, time) => sum + time, 0);
+    const isComplete = sorted.length >= WINDOW_FRAMES && (!this.#isSoftware || windowS >= SOFTWARE_WINDOW_S);
+    if (!isComplete && seconds < VERY_SLOW_FRAME_S) return false;
     this.#frameTimes.length = 0;
-    const median = seconds < VERY_SLOW_FRAME_S ? sorted[WINDOW_FRAMES >> 1] : seconds;
+    const median = seconds < VERY_SLOW_FRAME_S ? sorted[sorted.length >> 1] : seconds;
     const targetS = this.#targetS(this.#level, displayS);
     if (median > SLOW * targetS) return this.#reduce(median / targetS);
     const isCoarse = this.#isSoftware && this.quality.pixelRatioScale < CLEAN_SCALE;

@@ -1,7 +1,17 @@
 /**
  * Backdrop: the disc of gold leaf on its ground, a plane behind the stage. The floor reflects the same GLSL function.
  */
-import { Color, type IUniform, Mesh, PlaneGeometry, ShaderMaterial, Vector2 } from "three";
+import {
+  type BufferAttribute,
+  type BufferGeometry,
+  Color,
+  type IUniform,
+  Mesh,
+  PlaneGeometry,
+  ShaderMaterial,
+  Vector2,
+} from "three";
+import { orderTriangles } from "../rendering/triangle-order";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 import { createDenseGrid } from "./dense-grid";
 import type { Look } from "./look";
@@ -17,12 +27,16 @@ import {
 /** Position of the plane, in metres along z from the centre of the stage. */
 export const BACKDROP_Z_M = -2.6;
 
-/** Width and height of the plane in metres. */
+/** Width and height of the plane in metres, and the height of its centre. */
 const SIZE_M = [26, 14] as const;
+const HEIGHT_M = 5;
+const CENTRE_GLSL = `vec2(0., ${HEIGHT_M.toFixed(1)})`;
+/** Indices of a grid's cell: two triangles. */
+const CELL_INDICES = 6;
 
 /**
- * Width of the ring around the disc that software rendering reads from a texture, in metres: the cells of the grid
- * beyond it have no corner on the disc.
+ * Width of the ring around the disc that software rendering reads from a texture, in metres. Cells of the grid with no
+ * corner within it do not touch the disc.
  */
 const DISC_MARGIN_M = 0.4;
 
@@ -106,6 +120,8 @@ export interface Backdrop {
   readonly mesh: Mesh;
   /** Draws the baked function. */
   usesSimpleMaterials: boolean;
+  /** Follow a change of the disc's position or radius. */
+  fitDisc(): void;
   dispose(): void;
 }
 
@@ -118,17 +134,21 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
     vertexShader: VERTEX_GLSL,
     fragmentShader: FRAGMENT_GLSL,
   });
-  const simple = new ShaderMaterial({
-    uniforms: { ...uniforms, ...vignette, ...baked },
-    depthWrite: false,
-    toneMapped: false,
-    vertexShader: SIMPLE_VERTEX_GLSL,
-    fragmentShader: SIMPLE_FRAGMENT_GLSL,
-  });
+  // Two materials, since without a graphics processor branches save nothing: the disc has a texture, the ground does not.
+  const simple = [SIMPLE_DISC, SIMPLE_GROUND].map(
+    (shaders) =>
+      new ShaderMaterial({
+        uniforms: { ...uniforms, ...vignette, ...baked },
+        depthWrite: false,
+        toneMapped: false,
+        ...shaders,
+      }),
+  );
   const [plane, grid] = [new PlaneGeometry(...SIZE_M), createDenseGrid(SIZE_M, 48, 28, "lower")];
-  const mesh = new Mesh<PlaneGeometry, ShaderMaterial>(plane, detailed);
+  const cells = Array.from((grid.index as BufferAttribute).array);
+  const mesh = new Mesh<PlaneGeometry, ShaderMaterial | ShaderMaterial[]>(plane, detailed);
   mesh.name = "backdrop";
-  mesh.position.set(0, 5, BACKDROP_Z_M);
+  mesh.position.set(0, HEIGHT_M, BACKDROP_Z_M);
   mesh.onBeforeRender = updateVignette(vignette);
   const backdrop = {
     mesh,
@@ -142,32 +162,46 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
       // it.
       mesh.renderOrder = on ? 3 : -5;
     },
+    fitDisc() {
+      const { discCentre, discRadius } = uniforms;
+      splitGrid(grid, cells, (x, y) => {
+        const away = Math.hypot(x - discCentre.value.x, y + HEIGHT_M - discCentre.value.y);
+        return away < discRadius.value + DISC_MARGIN_M;
+      });
+    },
     dispose() {
-      for (const part of [plane, grid, detailed, simple]) part.dispose();
+      for (const part of [plane, grid, detailed, ...simple]) part.dispose();
     },
   };
   backdrop.usesSimpleMaterials = false;
+  backdrop.fitDisc();
   return backdrop;
+}
+
+/**
+ * Divide the triangles of a grid into two groups: those with a corner for which `isInside` is true, whose cells are
+ * `cells`, and the others.
+ */
+function splitGrid(grid: BufferGeometry, cells: readonly number[], isInside: (x: number, y: number) => boolean): void {
+  const { position } = grid.attributes;
+  const inside: number[] = [];
+  const outside: number[] = [];
+  for (let at = 0; at < cells.length; at += CELL_INDICES) {
+    const cell = cells.slice(at, at + CELL_INDICES);
+    const part = cell.some((corner) => isInside(position.getX(corner), position.getY(corner))) ? inside : outside;
+    part.push(...cell);
+  }
+  grid.setIndex([...orderTriangles(inside), ...orderTriangles(outside)]);
+  grid.clearGroups();
+  grid.addGroup(0, inside.length, 0);
+  grid.addGroup(inside.length, outside.length, 1);
 }
 
 const VERTEX_GLSL = /* glsl */ `
 varying vec2 vAt;
 void main() {
-  vAt = position.xy + vec2(0., 5.);
+  vAt = position.xy + ${CENTRE_GLSL};
   gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
-}`;
-const SIMPLE_VERTEX_GLSL = /* glsl */ `
-${BAKED_GLSL}
-${VIGNETTE_VERTEX_GLSL}
-uniform vec2 discCentre; uniform float discRadius; uniform vec3 vignetteColour;
-varying vec2 vPlace, vFromDisc; varying vec3 vColour;
-void main() {
-  vec2 at = position.xy + vec2(0., 5.);
-  vPlace = bakedPlace(at);
-  vFromDisc = (at - discCentre) / (discRadius + ${DISC_MARGIN_M});
-  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
-  setVignette();
-  vColour = mix(texture2D(bakedSharp, vPlace).rgb, vignetteColour, vShade);
 }`;
 const FRAGMENT_GLSL = /* glsl */ `
 ${DISPLAYED_BACKDROP_GLSL}
@@ -176,12 +210,32 @@ varying vec2 vAt;
 void main() {
   gl_FragColor = vec4(withVignette(displayedBackdrop(vAt, 0.)) + (hash2(gl_FragCoord.xy) - .5) / 160., 1.);
 }`;
-const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
+const SIMPLE_DISC = {
+  vertexShader: /* glsl */ `
+${BAKED_GLSL}
+${VIGNETTE_VERTEX_GLSL}
+varying vec2 vPlace;
+void main() {
+  vPlace = bakedPlace(position.xy + ${CENTRE_GLSL});
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+  setVignette();
+}`,
+  fragmentShader: /* glsl */ `
 ${BAKED_GLSL}
 ${VIGNETTE_VARYING_GLSL}
-varying vec2 vPlace, vFromDisc; varying vec3 vColour;
+varying vec2 vPlace;
+void main() { gl_FragColor = vec4(withVignette(texture2D(bakedSharp, vPlace).rgb), 1.); }`,
+};
+const SIMPLE_GROUND = {
+  vertexShader: /* glsl */ `
+${BAKED_GLSL}
+${VIGNETTE_VERTEX_GLSL}
+uniform vec3 vignetteColour;
+varying vec3 vColour;
 void main() {
-  vec3 colour = vColour;
-  if (dot(vFromDisc, vFromDisc) < 1.) colour = withVignette(texture2D(bakedSharp, vPlace).rgb);
-  gl_FragColor = vec4(colour, 1.);
-}`;
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.);
+  setVignette();
+  vColour = mix(texture2D(bakedSharp, bakedPlace(position.xy + ${CENTRE_GLSL})).rgb, vignetteColour, vShade);
+}`,
+  fragmentShader: "varying vec3 vColour; void main() { gl_FragColor = vec4(vColour, 1.); }",
+};

@@ -18,6 +18,7 @@ import {
   type Vector2,
   type WebGLProgramParametersWithUniforms,
 } from "three";
+import { orderTriangles } from "../rendering/triangle-order";
 import { BACKDROP_GLSL, BACKDROP_Z_M, type BackdropUniforms } from "./backdrop";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 import { createDenseGrid } from "./dense-grid";
@@ -121,6 +122,7 @@ function createGrid(): PlaneGeometry {
   for (let cell = 0; cell < array.length; cell += 6)
     if (grid.attributes.position.getX(array[cell]) < 0)
       [array[cell + 2], array[cell + 3]] = [array[cell + 4], array[cell]];
+  grid.setIndex(orderTriangles(array));
   return grid;
 }
 

@@ -56,6 +56,7 @@ export class Scenery {
   placeDisc(radius: number, height: number): void {
     this.#backdropUniforms.discRadius.value = radius;
     this.#backdropUniforms.discCentre.value.set(0, height);
+    this.#backdrop.fitDisc();
     this.invalidate();
   }
 

@@ -111,10 +111,19 @@ test("in software the picture stays clean at 20 frames a second, and becomes cle
   expect(choice.quality.pixelRatioScale).toBe(0.75);
 });
 
+test("in software slow frames in a row do not reduce a clean picture that has 20 frames a second otherwise", () => {
+  const choice = new AdaptiveQuality(SOFTWARE, false);
+  for (let second = 0; second < 120; second++) {
+    for (let i = 0; i < 14; i++) choice.addFrameTime(0.045);
+    for (let i = 0; i < 6; i++) choice.addFrameTime(0.07);
+    expect(choice.quality.pixelRatioScale).toBe(0.75);
+  }
+});
+
 test("in software a machine on which only the coarse picture reaches 20 frames a second shows that one", () => {
   const choice = new AdaptiveQuality(SOFTWARE, false);
   const shown = new Map<number, number>();
-  for (let i = 0; i < 5000; i++) {
+  for (let i = 0; i < 10_000; i++) {
     const { pixelRatioScale } = choice.quality;
     const seconds = pixelRatioScale > 0.6 ? 1 / 18 : 1 / 21;
     shown.set(pixelRatioScale, (shown.get(pixelRatioScale) ?? 0) + seconds);
