@@ -8,6 +8,7 @@ import { limbHolders, limbName } from "../ui/limb-state";
 import type { ShowToast } from "../ui/notification/toast";
 import type { PropActions } from "../ui/strings/prop-section";
 import { MAX_PROPS } from "../wire/limbs";
+import type { PropPresence } from "../wire/messages";
 import type { RemotePlayback } from "./remote-playback";
 
 export interface PropContext {
@@ -16,6 +17,8 @@ export interface PropContext {
   putProp(prop: number, limb: number | null): Promise<PropRefusalReason | null>;
   moveProp(): Promise<{ readonly limb: number | null; readonly refusal: PropRefusalReason | null }>;
 }
+
+const ALL_NUMBERS = Array.from({ length: MAX_PROPS }, (_, prop) => prop);
 
 /** Texts for refusals that do not depend on the hand. */
 const REFUSAL_TEXTS: Partial<Record<PropRefusalReason, PlainMessageKey>> = {
@@ -33,26 +36,40 @@ export async function moveNearestProp({ current, moveProp, toast }: PropContext)
 
 /** Return the actions; `context` is read at each of them. */
 export function createPropActions(context: () => PropContext): PropActions {
-  const edit = (props: Record<string, PropKind | null>) => {
+  /** Numbers of the props after the last edit of this page: the session may not have told them yet. */
+  let known: readonly number[] = [];
+  let lastEdit: Promise<void> = Promise.resolve();
+  const edit = async (props: Record<string, PropKind | null>) => {
     const { current, toast } = context();
     if (!current) return;
-    editSession(current.id, { props }).catch((error: unknown) =>
-      toast(error instanceof ProblemError ? translate("{title}: {detail}", error) : String(error)),
-    );
+    try {
+      const session = await editSession(current.id, { props });
+      known = numbersOf(session.props);
+    } catch (error) {
+      known = [];
+      toast(error instanceof ProblemError ? translate("{title}: {detail}", error) : String(error));
+    }
+  };
+  const add = async (kind: PropKind) => {
+    const present = numbersOf(context().current?.presence?.props);
+    const findFree = (...used: number[]) => ALL_NUMBERS.find((prop) => !used.includes(prop));
+    const free = findFree(...present, ...known) ?? findFree(...present);
+    if (free !== undefined) await edit({ [free]: kind });
   };
   return {
-    add(kind) {
-      const used = context().current?.presence?.props?.map(({ prop }) => prop) ?? [];
-      const free = Array.from({ length: MAX_PROPS }, (_, prop) => prop).find((prop) => !used.includes(prop));
-      if (free !== undefined) edit({ [free]: kind });
-    },
-    remove: (prop) => edit({ [prop]: null }),
+    // One after the other, so that each has its own number.
+    add: (kind) => void (lastEdit = lastEdit.then(() => add(kind))),
+    remove: (prop) => void edit({ [prop]: null }),
     async put(prop, limb) {
       const { current, putProp, toast } = context();
       const refusal = await putProp(prop, limb).catch(() => "no answer" as const);
       if (refusal && current) toast(describeRefusal(refusal, limb, current));
     },
   };
+}
+
+function numbersOf(props: readonly PropPresence[] | null | undefined): number[] {
+  return props?.map(({ prop }) => prop) ?? [];
 }
 
 function describeRefusal(

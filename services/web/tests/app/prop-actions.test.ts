@@ -53,22 +53,46 @@ function show(numbers: number[], holder: string | null = null): void {
   playback?.apply({ event: "presence", presence });
 }
 
-test("a new prop takes the lowest free number of the session", () => {
-  actions.add("fan");
+/** Run what waits for settled promises. */
+const handleAll = () => new Promise((resolve) => setImmediate(resolve));
+
+test("a new prop takes the lowest free number of the session", async () => {
   show([0, 1, 3]);
-  actions.add("umbrella");
-  expect(requests).toEqual([
-    ["PATCH /v1/sessions/s%201", { props: { "0": "fan" } }],
-    ["PATCH /v1/sessions/s%201", { props: { "2": "umbrella" } }],
-  ]);
+  createPropActions(context).add("umbrella");
+  await expect.poll(() => requests).toEqual([["PATCH /v1/sessions/s%201", { props: { "2": "umbrella" } }]]);
 });
 
-test("without a free number, or without a session, nothing is sent", () => {
+test("props that are added at once have numbers of their own, before the session tells them", async () => {
+  const present: { prop: number }[] = [];
+  respond = () => {
+    const [[, { props }]] = requests.slice(-1) as [[string, { props: object }]];
+    present.push(...Object.keys(props).map((prop) => ({ prop: Number(prop) })));
+    return Response.json({ props: present });
+  };
+  const { add } = createPropActions(context);
+  for (const kind of ["fan", "ball", "branch"] as const) add(kind);
+  await expect
+    .poll(() => requests.map((request) => (request as [string, { props: object }])[1].props))
+    .toEqual([{ "0": "fan" }, { "1": "ball" }, { "2": "branch" }]);
+});
+
+test("a number that was taken meanwhile is used again if there is no other", async () => {
+  respond = () => Response.json({ props: [0, 1, 2, 3, 4, 5, 6, 7].map((prop) => ({ prop })) });
+  const { add } = createPropActions(context);
+  add("fan");
+  add("ball");
+  await expect.poll(() => requests).toHaveLength(2);
+});
+
+test("without a free number, or without a session, nothing is sent", async () => {
+  const { add, remove } = createPropActions(context);
   show([0, 1, 2, 3, 4, 5, 6, 7]);
-  actions.add("ball");
+  add("ball");
+  await handleAll();
   playback = null;
-  actions.add("ball");
-  actions.remove(1);
+  add("ball");
+  remove(1);
+  await handleAll();
   expect(requests).toEqual([]);
 });
 

@@ -1,4 +1,5 @@
 /** Props: added by the panel, put into hands, passed to another performer, laid down and seen by others. */
+import { buffer } from "node:stream/consumers";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { findViolations } from "./accessibility";
@@ -172,6 +173,47 @@ describeInBrowser("props", { server: "open" }, (fixture) => {
     expect(total).toBeGreaterThan(0.3);
     expect(steps).toBeGreaterThan(2);
     expect(longest).toBeLessThan(0.9 * total);
+  });
+
+  test("a recording shows its props, and its GLB file has them", async () => {
+    const page = await open("Aiko");
+    await stopDrawing(page);
+    await fixture.request("PATCH", `/v1/sessions/${fixture.session}`, { props: { "0": "fan" }, playing: true });
+    await waitInEngine(page, () => {
+      const { puppeteer, viewer } = globalThis.bunraku;
+      if (viewer.presence?.props?.[0]?.limb === 1) return true;
+      puppeteer.put(0, 1);
+      return false;
+    });
+    // The last second has the fan in the hand.
+    const after = await evaluateInEngine(page, () => globalThis.bunraku.viewer.clockTime(performance.now()) ?? 0);
+    await waitInEngine(
+      page,
+      (after) => (globalThis.bunraku.viewer.clockTime(performance.now()) ?? 0) > after + 2e6,
+      after,
+    );
+    const { id } = await fixture.request<{ id: string }>("POST", `/v1/sessions/${fixture.session}/recordings`, {
+      name: "With a fan",
+      seconds: 2,
+    });
+    const recorded = await fixture.open(`/?motion=${id}&name=Mateo`, REDUCED_MOTION);
+    await waitForFirstPose(recorded);
+    await recorded.keyboard.press("ArrowRight");
+    await waitForHand(recorded, RIGHT_HAND);
+    await recorded.getByRole("button", { name: "Library", exact: true }).click();
+    await recorded.getByRole("button", { name: "Download With a fan", exact: true }).click();
+    const [download] = await Promise.all([
+      recorded.waitForEvent("download"),
+      recorded
+        .getByRole("group", { name: "Download With a fan as", exact: true })
+        .getByRole("button", { name: /^GLB,/ })
+        .click(),
+    ]);
+    const file = await buffer(await download.createReadStream());
+    const { nodes } = JSON.parse(file.subarray(20, 20 + file.readUInt32LE(12)).toString()) as {
+      nodes: { name: string }[];
+    };
+    expect(nodes.map(({ name }) => name)).toContain("prop 1 fan");
   });
 
   test.each([
