@@ -35,7 +35,9 @@ def test_pulls_of_two_replicas_move_an_open_limb_and_are_logged() -> None:
         state = timeline.start("one", motion.first_track.duration_us, clock())
         stage = Stage(SessionStart("s", motion, state, state.clock, crowd=((1, "median"),)), bus, clock)
         audience = StageMessages(bus)
-        relays = [CrowdRelay(name, clock, lambda data: bus.publish("session.s.crowd", data)) for name in "ab"]
+        relays: list[CrowdRelay[int]] = [
+            CrowdRelay(name, clock, lambda data: bus.publish("session.s.crowd", data)) for name in "ab"
+        ]
         for relay in relays:
             bus.subscribe("session.s.presence", partial(_forward_presence, relay))
             relay.set_presence(stage.presence)
@@ -64,7 +66,7 @@ def test_pulls_of_two_replicas_move_an_open_limb_and_are_logged() -> None:
     assert np.ptp(joints, axis=0).max() > 1_000
 
 
-def _forward_presence(relay: CrowdRelay, data: bytes) -> None:
+def _forward_presence(relay: CrowdRelay[int], data: bytes) -> None:
     presence = unpack(data)
     assert isinstance(presence, Presence)
     relay.set_presence(presence)
