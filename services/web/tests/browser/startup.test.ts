@@ -19,7 +19,8 @@ const DEFERRED_FILES = [
   /\/hands-/,
   /planted-feet-/,
   /prop-group-/,
-  // what the props on the stage share with their controls
+  // what extensions share with exports, and the props on the stage with their controls
+  /prop-store-/,
   /\/props-/,
   /edge-smoothing-/,
   /crowd-(status|text)-/,
