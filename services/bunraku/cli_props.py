@@ -28,7 +28,7 @@ def props(
 ) -> None:
     """Bring props on the stage of a session, remove some, and list them. Puppeteers put them into hands."""
     from bunraku.client.api import Client
-    from bunraku.motion.prop import MAX_PROPS
+    from bunraku.wire.prop import MAX_PROPS
 
     base, kind, session_id = parse_resource_address(session)
     if kind == "motions":

@@ -18,7 +18,7 @@ import httpx2
 
 from bunraku.client import Client
 from bunraku.http.access_control import Role
-from bunraku.motion.prop import MAX_PROPS
+from bunraku.wire.prop import MAX_PROPS
 from tests.attack.probe import run_probe
 from tests.attack.registry import SOURCE_ADDRESSES, Attack, Target
 from tests.attack.resources import ResourceMeter, find_service_processes

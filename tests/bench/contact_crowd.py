@@ -29,7 +29,7 @@ from bunraku.messaging.bus import MemoryBus
 from bunraku.playout import timeline
 from bunraku.playout.overlay_buffer import pack_overlay
 from bunraku.playout.session_log import SessionLog
-from bunraku.session.crowd_control import CROWD, CrowdControl
+from bunraku.session.control.crowd_control import CROWD, CrowdControl
 from bunraku.session.session_start import Fittings, SessionStart
 from bunraku.session.stage import Stage
 from tests.marionette.bond.bonded_stage import FRAME_INTERVAL_US, BondedStage, random_dance

@@ -28,8 +28,8 @@ from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
 from bunraku.motion.analysis import analyse
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import PropState
 from bunraku.wire.messages import Data, Description, unpack
+from bunraku.wire.prop import PropState
 from tests.motion.extended_source import extended_source
 from tests.vectors.audio import random_packets
 from tests.vectors.blocks import random_motion

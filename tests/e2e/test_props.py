@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bunraku.client import Client, Puppeteer, Viewer
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop, PropState
+from bunraku.wire.prop import Prop, PropState
 from tests.patient_viewer import watch_until
 
 FAN_IN_HAND = Prop("fan", PropState(1))

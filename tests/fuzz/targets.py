@@ -31,11 +31,11 @@ from bunraku.codec.skeleton_description import MAX_SKELETON_BYTES, SkeletonDescr
 from bunraku.motion.extension import BodyExtension, extend_pose
 from bunraku.motion.face import MAX_GAZE_RAD, Face, face_expressions
 from bunraku.motion.hands import WRISTS, Hands, pose_hands
-from bunraku.motion.prop import MAX_PROPS
 from bunraku.motion.rotation import IDENTITY, Array
 from bunraku.motion.skeleton import JOINT_COUNT, world_transforms
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import Description, unpack
+from bunraku.wire.prop import MAX_PROPS
 from tests.vectors.blocks import random_coefficients
 from tests.vectors.golden import VECTORS_FOLDER
 

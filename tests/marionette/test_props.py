@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from bunraku.marionette.props import PropRefusalReason, StageProps
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import MAX_PROPS, Prop, PropState
+from bunraku.wire.prop import MAX_PROPS, Prop, PropState
 
 HERE, THERE = Placement(0.5, 1.0, 0.0), Placement(-1.0, 0.25, 2.0)
 FREE = (None,) * 8

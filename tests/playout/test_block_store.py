@@ -12,9 +12,9 @@ from bunraku.codec.scene import SceneSamples
 from bunraku.codec.scene_decoder import decode_scene_block
 from bunraku.codec.scene_encoder import EncodedScene, encode_scene
 from bunraku.motion import rotation
-from bunraku.motion.prop import PropState
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout.block_store import ContactBlockStore, MotionBlockStore, PropBlockStore, SceneBlockStore
+from bunraku.wire.prop import PropState
 from tests.vectors.blocks import random_motion
 from tests.vectors.scene import sample_camera
 

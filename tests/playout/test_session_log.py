@@ -4,7 +4,6 @@ import msgpack
 import pytest
 
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop, PropState
 from bunraku.playout import session_log
 from bunraku.playout.session_log import (
     CHUNK_DURATION_US,
@@ -17,6 +16,7 @@ from bunraku.playout.session_log import (
 from bunraku.wire.limbs import MAX_LIMBS
 from bunraku.wire.messages import Claim, TimelineState
 from bunraku.wire.overlay import Overlay
+from bunraku.wire.prop import Prop, PropState
 
 MESSAGE_INTERVAL_US = 2 * Overlay.FRAME_INTERVAL_US
 

@@ -13,7 +13,7 @@ from bunraku.marionette.crowd.crowd_limb import SUMMARY_LIFETIME_US
 from bunraku.messaging.bus import MemoryBus
 from bunraku.playout import timeline
 from bunraku.playout.session_log import SessionLog
-from bunraku.session.crowd_control import CROWD
+from bunraku.session.control.crowd_control import CROWD
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_registry import SessionRecord
 from bunraku.session.session_start import Fittings, SessionStart

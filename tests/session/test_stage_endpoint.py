@@ -9,7 +9,6 @@ import pytest
 
 from bunraku.codec.container import StoredMotion, pack_motion
 from bunraku.codec.motion_encoder import encode_motion
-from bunraku.motion.prop import PropKind
 from bunraku.playout import timeline
 from bunraku.runtime.context import ServiceContext, open_context
 from bunraku.runtime.input_scheduler import TURN_US, InputScheduler
@@ -25,6 +24,7 @@ from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
 from bunraku.wire.messages import Claim, Put, TimelineState
+from bunraku.wire.prop import PropKind
 from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.time_limit import HANG_TIMEOUT_S
 from tests.vectors.blocks import random_motion

@@ -17,8 +17,8 @@ from bunraku.codec.extension.props import (
 )
 from bunraku.codec.timing import Timing
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import PropState
 from bunraku.playout.block_store import PropBlockStore
+from bunraku.wire.prop import PropState
 from tests.vectors.blocks import to_base64
 
 _FLOOR, _BACK = PropState(None, Placement(0.5, -0.25, 1.5)), PropState(None, Placement(-99.5, 100.0, -3.125))

@@ -29,7 +29,6 @@ from bunraku.motion.extension import BodyExtension, ExtendedPose, extend_pose
 from bunraku.motion.face import EXPRESSION_INDEX, Face, face_expressions
 from bunraku.motion.hands import Hands
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop, PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import world_transforms
 from bunraku.playout import timeline
@@ -65,6 +64,7 @@ from bunraku.wire.messages import (
     unpack,
 )
 from bunraku.wire.overlay import Overlay
+from bunraku.wire.prop import Prop, PropState
 
 FRAME_INTERVAL_S = 1 / 60
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import MAX_PROPS, Prop, PropState
 from bunraku.wire.limbs import is_hand
+from bunraku.wire.prop import MAX_PROPS, Prop, PropState
 
 
 class PropRefusalReason(StrEnum):

@@ -21,11 +21,11 @@ from typing import Any, Self
 
 import msgpack
 
-from bunraku.motion.prop import Prop
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.live import Live
 from bunraku.wire.messages import TimelineState, unpack
 from bunraku.wire.overlay import Overlay
+from bunraku.wire.prop import Prop
 
 MAGIC = b"bunraku.log/3"
 LOG_DURATION_US = 660_000_000

@@ -13,11 +13,11 @@ from bunraku.marionette.crowd.policy import CrowdPolicy
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import MAX_PROPS, PropKind
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, TIP_JOINTS, Figure
 from bunraku.runtime.problem import ProblemError
 from bunraku.wire.limbs import LIMBS, MAX_LIMBS
+from bunraku.wire.prop import MAX_PROPS, PropKind
 
 MAX_BONE_M = 3.0
 """Longest part of an offset or tip along one axis."""

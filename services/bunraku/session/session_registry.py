@@ -17,10 +17,10 @@ import msgpack
 from bunraku.messaging.bus import Subscription
 from bunraku.messaging.key_value import SESSION_KEY_PREFIX, KeyValueEntry, KeyValueStore, KeyValueView, RevisionConflict
 from bunraku.messaging.replica_registry import DEFAULT_TIMING, ReplicaRegistry, ReplicaTiming
-from bunraku.motion.prop import Prop
 from bunraku.runtime.availability import BackendUnavailable
 from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.wire.messages import TimelineState, unpack
+from bunraku.wire.prop import Prop
 
 MAX_OWN_CONFLICTS = 8
 """Number of conflicts with earlier writes of this replica, which were reported as failed, before a write fails."""

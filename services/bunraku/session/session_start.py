@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from bunraku.codec.container import StoredMotion
-from bunraku.motion.prop import Prop
 from bunraku.session.live.cast import EMPTY_CAST, Cast
 from bunraku.wire.messages import TimelineState
+from bunraku.wire.prop import Prop
 
 
 class Fittings(NamedTuple):

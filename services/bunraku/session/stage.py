@@ -22,22 +22,21 @@ from bunraku.marionette.ownership import InputOutcome, LimbGrant, LimbInput, Lim
 from bunraku.marionette.solver.limb_solver import PYTHON_SOLVER, LimbSolver
 from bunraku.messaging.bus import Bus, Subscription
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop
 from bunraku.motion.skeleton import Figure
 from bunraku.playout import timeline
 from bunraku.playout.block_store import Pose
 from bunraku.playout.overlay_buffer import pack_overlay
 from bunraku.playout.performance import SampleOutcome
 from bunraku.playout.session_log import SessionLog
-from bunraku.session.bond_control import BondControl
+from bunraku.session.control.bond_control import BondControl
+from bunraku.session.control.crowd_control import CrowdControl
+from bunraku.session.control.prop_control import PropControl
 from bunraku.session.counters import SessionCounters
-from bunraku.session.crowd_control import CrowdControl
 from bunraku.session.frame_rate import FrameRateControl
 from bunraku.session.live.cast import Cast
 from bunraku.session.live.live_performers import LivePerformers
 from bunraku.session.pose_cache import PoseCache
 from bunraku.session.presence import PresencePublisher
-from bunraku.session.prop_control import PropControl
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_start import Fittings, SessionStart
@@ -59,6 +58,7 @@ from bunraku.wire.messages import (
     Welcome,
 )
 from bunraku.wire.overlay import Overlay
+from bunraku.wire.prop import Prop
 
 OVERLAY_LEAD_US = 60_000
 """Lead time of overlays: a message every two frames, and the latency to a viewer near by."""

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 
 from pydantic import Field, WithJsonSchema
 
-from bunraku.motion.prop import MAX_PROPS
 from bunraku.wire.limbs import MAX_LIMBS, MAX_PERFORMERS
+from bunraku.wire.prop import MAX_PROPS
 
 Text = Annotated[str, Field(strict=True)]
 Flag = Annotated[bool, Field(strict=True)]

@@ -21,7 +21,7 @@ from bunraku.codec.extension.track import parse_extension_track
 from bunraku.codec.prior import MAX_BLOCK_FRAMES
 from bunraku.codec.timing import plan_timing
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import PropState
+from bunraku.wire.prop import PropState
 
 ON_FLOOR = PropState(None, Placement(0.5, -2.25, 1.5))
 SHOWN: list[list[ShownState]] = [

@@ -23,10 +23,10 @@ from bunraku.motion.analysis import analyse
 from bunraku.motion.extension import BodyExtension
 from bunraku.motion.mirror import OPPOSITE_JOINTS, mirror_body, mirror_face, mirror_hands
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, TIP_JOINTS, joint_and_tip_positions
 from bunraku.wire.messages import Data
+from bunraku.wire.prop import PropState
 from tests.audio import decode_opus, make_tone, write_audio
 from tests.ingest.jobs.motions import MOTIONS
 from tests.motion.extended_source import extended_source

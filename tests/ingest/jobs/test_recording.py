@@ -18,7 +18,6 @@ from bunraku.marionette.ownership import LimbInput
 from bunraku.messaging.recording_request import RecordingRequest, pack_camera
 from bunraku.motion.analysis import analyse
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop, PropState
 from bunraku.motion.skeleton import joint_and_tip_positions
 from bunraku.playout import timeline
 from bunraku.playout.block_store import MotionBlockStore, SceneBlockStore
@@ -26,6 +25,7 @@ from bunraku.playout.overlay_buffer import pack_joints
 from bunraku.playout.session_log import SessionLog
 from bunraku.wire.messages import Data
 from bunraku.wire.overlay import Overlay
+from bunraku.wire.prop import Prop, PropState
 from tests.ingest.jobs.motions import MOTIONS, PLACEMENTS, SECOND_US, START_CLOCK_US, make_log
 from tests.motion.extended_source import extended_source
 from tests.motion.synthetic_motion import stepping_motion

@@ -13,8 +13,8 @@ from bunraku.codec.extension.track import EXTENSION_TYPE, ExtensionPart, is_inde
 from bunraku.codec.leb128 import decode_leb128, encode_leb128
 from bunraku.codec.timing import Timing, parse_timing
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import MAX_PROPS, PropState
 from bunraku.wire.limbs import LIMBS, MAX_LIMBS, is_hand
+from bunraku.wire.prop import MAX_PROPS, PropState
 
 PROP_CODEC = "bunraku.prop/1"
 

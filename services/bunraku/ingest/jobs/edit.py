@@ -44,11 +44,11 @@ from bunraku.motion.mirror import (
     mirror_placement,
     mirror_vectors,
 )
-from bunraku.motion.prop import PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.seamless_loop import BLEND_S, close_loop, close_value_loop
 from bunraku.motion.skeleton import Motion
 from bunraku.wire.messages import Data
+from bunraku.wire.prop import PropState
 
 
 def edit_motion(

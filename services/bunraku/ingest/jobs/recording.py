@@ -19,11 +19,11 @@ from bunraku.ingest.jobs.encoding import FIRST_BLOCK_S, describe_encoding, encod
 from bunraku.ingest.jobs.replay import MissingMotion, SessionReplay, extensions_of, props_of
 from bunraku.ingest.result import NOTHING_TO_KEEP, JobRejection, JobResult
 from bunraku.messaging.recording_request import RECORDING_FPS, RecordingRequest
-from bunraku.motion.prop import MAX_PROPS, PropState
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Motion
 from bunraku.playout.session_log import CorruptSessionLog, SessionLog
 from bunraku.wire.limbs import LIMBS
+from bunraku.wire.prop import MAX_PROPS, PropState
 
 
 def encode_recording(

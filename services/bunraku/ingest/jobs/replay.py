@@ -12,7 +12,6 @@ from bunraku.codec.extension.props import PropTrack, ShownState, shift_limb
 from bunraku.codec.extension.track import ExtensionTrack, decode_extension_block
 from bunraku.codec.live import LiveTrack
 from bunraku.codec.motion_decoder import decode_motion_block
-from bunraku.motion.prop import Prop
 from bunraku.motion.rotation import Array
 from bunraku.playout.block_store import ExtensionBlockStore, MotionBlockStore, Pose, PropBlockStore
 from bunraku.playout.live_buffer import LiveBuffer
@@ -22,6 +21,7 @@ from bunraku.playout.timeline import position_at
 from bunraku.wire.live import Live
 from bunraku.wire.messages import Data, TimelineState
 from bunraku.wire.overlay import Overlay
+from bunraku.wire.prop import Prop
 
 OVERLAY_LEAD_US = 100_000
 """Lead time with which overlays are published before they are due, in microseconds: no viewer gets them earlier."""

@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop, PropState
+from bunraku.wire.prop import Prop, PropState
 
 
 @pytest.mark.parametrize("state", [PropState(), PropState(5, Placement(0.5, -2.0, 1.0))])

@@ -7,7 +7,7 @@ from bunraku.marionette.crowd.crowd_limb import SUMMARY_LIFETIME_US
 from bunraku.marionette.crowd.policy import TURN_US
 from bunraku.marionette.crowd.pulls import CrowdPulls as Pulls
 from bunraku.marionette.ownership import Ownership
-from bunraku.session.crowd_control import CROWD, PULLS_INTERVAL_US, CrowdControl
+from bunraku.session.control.crowd_control import CROWD, PULLS_INTERVAL_US, CrowdControl
 from bunraku.wire.errors import MalformedMessage
 from bunraku.wire.messages import CrowdPulls, unpack
 

@@ -12,16 +12,16 @@ from pydantic import ValidationError
 from bunraku.codec import motion_decoder
 from bunraku.messaging.bus import MemoryBus
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import Prop, PropState
 from bunraku.playout import timeline
 from bunraku.playout.session_log import SessionLog
-from bunraku.session.prop_control import ROW_DISTANCE_M, PropControl
+from bunraku.session.control.prop_control import ROW_DISTANCE_M, PropControl
 from bunraku.session.puppeteer_roster import PuppeteerRoster
 from bunraku.session.schema import SessionEdit
 from bunraku.session.session_registry import SessionRecord
 from bunraku.session.session_start import Fittings, SessionStart
 from bunraku.session.stage import Stage
 from bunraku.wire.messages import Presence, PropRefusal, Put, unpack
+from bunraku.wire.prop import Prop, PropState
 from tests.session.joined_stage import StageMessages, join_stage, stored_motion
 from tests.virtual_time import run_in_virtual_time
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from bunraku.marionette.props import StageProps
 from bunraku.motion.placement import Placement
-from bunraku.motion.prop import MAX_PROPS, Prop, PropState
 from bunraku.session.puppeteer_roster import Puppeteer
 from bunraku.wire.messages import PropRefusal, Put
+from bunraku.wire.prop import MAX_PROPS, Prop, PropState
 
-ROW_DISTANCE_M, ROW_GAP_M = 1.0, 0.35
+ROW_DISTANCE_M, ROW_GAP_M = 1.0, 0.6
 """Distance of the row of new props before the first performer, and the gap between two of them."""
 
 

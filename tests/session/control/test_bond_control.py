@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 from bunraku.marionette.ownership import Ownership
-from bunraku.session.bond_control import BondControl
+from bunraku.session.control.bond_control import BondControl
 from bunraku.session.puppeteer_roster import Puppeteer, PuppeteerRoster
 from bunraku.wire.messages import Bond, BondEnd, unpack
 
