@@ -44,7 +44,7 @@ const INSTALLER = /\/src\/immersive\/complete-renderer\.ts$/;
  */
 const UNUSED_METHODS = `
   toJSON fromJSON raycast
-  addColors addScalar clampLength clampScalar manhattanDistanceTo multiplyVectors randomDirection rotateAround roundToZero
+  addColors addScalar clampScalar manhattanDistanceTo multiplyVectors randomDirection rotateAround roundToZero
   setFromColor setFromCylindrical setFromCylindricalCoords setFromMatrixScale setFromMatrix3Column setFromSpherical
   setFromSphericalCoords subScalar transformUv
   multiplyQuaternionsFlat rotateTowards setFromVector3 setAxisAngleFromQuaternion setAxisAngleFromRotationMatrix
