@@ -23,7 +23,7 @@ from bunraku.session.stage import Stage
 from bunraku.session.stage_endpoint import StageEndpoint
 from bunraku.session.stage_proxy import StageProxy
 from bunraku.stream.watched_session import VIEWER_COUNT_REFRESH_S
-from bunraku.wire.messages import Claim, Put, TimelineState
+from bunraku.wire.messages import Claim, Grant, Put, TimelineState, unpack
 from bunraku.wire.prop import PropKind
 from tests.session.recording_puppeteer import RecordingPuppeteer
 from tests.time_limit import HANG_TIMEOUT_S
@@ -106,6 +106,13 @@ async def join_stage(
     return stage, connection
 
 
+async def wait_for_grant(puppeteer: RecordingPuppeteer) -> None:
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        while not any(isinstance(unpack(message), Grant) for message in puppeteer.queued):
+            puppeteer.has_messages.clear()
+            await puppeteer.has_messages.wait()
+
+
 async def test_edit_that_cannot_be_saved_is_not_shown(
     context: ServiceContext, endpoint: StageEndpoint, owner: FakeStageOwner
 ) -> None:
@@ -153,8 +160,10 @@ async def test_unknown_puppeteer_is_notified(context: ServiceContext) -> None:
 async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, endpoint: StageEndpoint) -> None:
     stage, dead = await join_stage(context, "dead")
     _, living = await join_stage(context, "living")
-    stage.send(dead, Claim(0).pack())
-    stage.send(living, Claim(1).pack())
+    for limb, puppeteer in enumerate((dead, living)):
+        stage.send(puppeteer, Claim(limb).pack())
+        # on a slow machine its turn is in a later iteration of the event loop
+        await wait_for_grant(puppeteer)
     assert endpoint.stage.presence.limbs == [dead.id, living.id, None, None]
     for puppeteer in endpoint.stage.puppeteers:
         if puppeteer.id == dead.id:
