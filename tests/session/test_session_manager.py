@@ -113,7 +113,10 @@ async def test_any_replica_reaches_a_session(context: ServiceContext, replicas: 
     assert received(ben, Grant)
     assert (await owner.stage_proxy(opened["id"]).describe())["limbs"] == [None, None, ben.id, None]
     stage.send(ben, None)
-    assert (await stage.describe())["puppeteers"] == []
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        # on a slow machine the last message has its turn in a later iteration of the event loop
+        while (await stage.describe())["puppeteers"]:
+            pass
     second = await other.open_session("one")
     for manager in (owner, other):
         items, cursor = await manager.list_sessions(1, None)

@@ -160,10 +160,10 @@ async def test_unknown_puppeteer_is_notified(context: ServiceContext) -> None:
 async def test_puppeteer_of_a_dead_replica_is_removed(context: ServiceContext, endpoint: StageEndpoint) -> None:
     stage, dead = await join_stage(context, "dead")
     _, living = await join_stage(context, "living")
-    for limb, puppeteer in enumerate((dead, living)):
-        stage.send(puppeteer, Claim(limb).pack())
+    for limb, joined in enumerate((dead, living)):
+        stage.send(joined, Claim(limb).pack())
         # on a slow machine its turn is in a later iteration of the event loop
-        await wait_for_grant(puppeteer)
+        await wait_for_grant(joined)
     assert endpoint.stage.presence.limbs == [dead.id, living.id, None, None]
     for puppeteer in endpoint.stage.puppeteers:
         if puppeteer.id == dead.id:
