@@ -85,14 +85,18 @@ def owner() -> FakeStageOwner:
     return FakeStageOwner()
 
 
-@pytest.fixture
-async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncIterator[StageEndpoint]:
+async def open_endpoint(context: ServiceContext, owner: FakeStageOwner) -> StageEndpoint:
     stored = await context.motion_store.get("one")
     assert stored is not None
     state = timeline.start("one", stored.first_track.duration_us, context.clock())
     stage = Stage(SessionStart("s", stored, state, state.clock), context.bus, context.clock)
     owner.casts = CastStore(context.motion_store)
-    opened = StageEndpoint(stage, context, owner, 1)
+    return StageEndpoint(stage, context, owner, 1)
+
+
+@pytest.fixture
+async def endpoint(context: ServiceContext, owner: FakeStageOwner) -> AsyncIterator[StageEndpoint]:
+    opened = await open_endpoint(context, owner)
     yield opened
     await opened.close()
 
@@ -253,3 +257,27 @@ async def test_moved_props_are_saved_for_a_server_that_takes_over(
     await owner.wait_for_saves(4)
     assert endpoint.stage.props.has_unsaved_moves
     assert (await stage.describe())["props"][0]["limb"] == 1
+
+
+async def test_session_that_is_lost_while_moves_are_saved_is_closed(
+    context: ServiceContext, owner: FakeStageOwner, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stage_endpoint, "PUPPETEER_HEARTBEAT_S", 0.01)
+    endpoint = await open_endpoint(context, owner)
+    stage, connection = await join_stage(context, "Ada")
+    await stage.edit(SessionEdit(props={"2": PropKind.FAN}))
+    closed = asyncio.Event()
+
+    async def lose(*_: object) -> None:
+        await endpoint.close()
+        closed.set()
+        raise ProblemError(503, "Session elsewhere", "another server has taken over this session")
+
+    monkeypatch.setattr(owner, "save_record", lose)
+    sweep, ticks = endpoint._sweep_task, endpoint.stage._tick_task
+    stage.send(connection, Put(2, limb=1).pack())
+    async with asyncio.timeout(HANG_TIMEOUT_S):
+        await closed.wait()
+        await asyncio.wait((sweep,))
+    assert ticks.done()
+    assert connection.is_unknown

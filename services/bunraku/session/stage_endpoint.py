@@ -106,14 +106,18 @@ class StageEndpoint:
                 for operation, handler in operations.items()
             ),
         ]
+        self._is_closed = False
         self._sweep_task = asyncio.create_task(self._expire_participants(), name=f"participants of {stage.id}")
 
     async def close(self) -> None:
         """Stop responding, disconnect the puppeteers and close the stage."""
         for subscription in self._subscriptions:
             subscription.unsubscribe()
-        self._sweep_task.cancel()
-        await asyncio.wait((self._sweep_task,))
+        self._is_closed = True
+        # not from the task itself, which closes the endpoint when it finds that the session is lost
+        if asyncio.current_task() is not self._sweep_task:
+            self._sweep_task.cancel()
+            await asyncio.wait((self._sweep_task,))
         # its exception refers to this object: without the reference both are freed at once
         del self._sweep_task
         await self._performers.close()
@@ -252,6 +256,8 @@ class StageEndpoint:
             self._performers.expire(stalled_us)
             await self._performers.maintain()
             await self._save_moves()
+            if self._is_closed:
+                return
             for puppeteer in self.stage.puppeteers:
                 puppeteer.last_heard_us += stalled_us
                 if now - puppeteer.last_heard_us > PUPPETEER_TIMEOUT_US:
