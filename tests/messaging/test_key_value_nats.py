@@ -6,7 +6,7 @@ import asyncio
 import json
 import shutil
 from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -30,6 +30,18 @@ async def open_store(url: str) -> AsyncIterator[tuple[NatsBus, NatsKeyValueStore
         await bus.close()
 
 
+@asynccontextmanager
+async def open_bucket(server: ServerProcess) -> AsyncIterator[tuple[NatsBus, NatsKeyValueStore]]:
+    """Open the store of a server that has created the bucket, which a busy machine may not do in time at first."""
+    async with open_store(nats_url_of(server)) as (bus, store):
+        async with asyncio.timeout(HANG_TIMEOUT_S):
+            while True:
+                with suppress(BackendUnavailable):
+                    await store.get("sessions.none")
+                    break
+        yield bus, store
+
+
 async def wait_until_connected(bus: NatsBus, server: ServerProcess) -> None:
     reconnected = asyncio.Event()
     subscription = bus.on_reconnect(reconnected.set)
@@ -41,7 +53,7 @@ async def wait_until_connected(bus: NatsBus, server: ServerProcess) -> None:
 
 async def test_value_survives_a_server_crash(tmp_path: Path) -> None:
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store):
+        async with open_bucket(server) as (bus, store):
             revision = await store.put("sessions.a", b"1", 0)
             server.kill()
             for operation in (
@@ -57,7 +69,7 @@ async def test_value_survives_a_server_crash(tmp_path: Path) -> None:
 
 async def test_bucket_is_recreated_after_data_loss(tmp_path: Path) -> None:
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store):
+        async with open_bucket(server) as (bus, store):
             await store.put("sessions.a", b"1")
             server.stop()
             shutil.rmtree(tmp_path / "store")
@@ -73,7 +85,7 @@ async def test_bucket_is_recreated_after_data_loss(tmp_path: Path) -> None:
 
 async def test_suspended_server_is_unavailable_until_resumed(tmp_path: Path) -> None:
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store):
+        async with open_bucket(server) as (bus, store):
             await store.put("sessions.a", b"1")
             reconnected = asyncio.Event()
             bus.on_reconnect(reconnected.set)
@@ -124,7 +136,7 @@ async def synchronise_again_and_again(store: NatsKeyValueStore) -> None:
 
 async def test_watch_misses_no_change_when_its_connection_is_cut(tmp_path: Path) -> None:
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store), open_store(nats_url_of(server)) as (_, other):
+        async with open_bucket(server) as (bus, store), open_bucket(server) as (_, other):
             changes: list[tuple[str, bytes | None]] = []
             store.watch().on_change(lambda key, entry: changes.append((key, None if entry is None else entry.value)))
             await other.put("sessions.ended", b"0")
@@ -145,7 +157,7 @@ async def test_watch_misses_no_change_when_its_connection_is_cut(tmp_path: Path)
 
 async def test_watch_follows_a_server_that_lost_its_data(tmp_path: Path) -> None:
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store):
+        async with open_bucket(server) as (bus, store):
             for number in range(20):
                 await store.put("sessions.a", b"%d" % number)
             assert await synchronised_keys(store) == {"sessions.a": b"19"}
@@ -161,7 +173,7 @@ async def test_watch_follows_a_server_that_lost_its_data(tmp_path: Path) -> None
 
 async def test_watch_begins_again_after_a_missing_message(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store):
+        async with open_bucket(server) as (bus, store):
             await store.put("sessions.a", b"1")
             await synchronised_keys(store)
             deliver, dropped = bus.on_message, asyncio.Event()
@@ -185,7 +197,7 @@ async def test_watch_begins_again_after_a_missing_message(tmp_path: Path, monkey
 async def test_removed_keys_leave_nothing_for_ever(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(key_value_nats, "MARKER_LIFETIME_S", 0.0)
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (bus, store):
+        async with open_bucket(server) as (bus, store):
             for number in range(30):
                 await store.put(f"sessions.{number}", b"1", 0)
                 await store.remove(f"sessions.{number}")
@@ -205,7 +217,7 @@ async def test_copy_counts_as_incomplete_while_no_consumer_follows(
     monkeypatch.setattr(key_value_watch_nats, "MAX_MISSED_HEARTBEATS", 0.05)
     monkeypatch.setattr(key_value_watch_nats, "RESTART_DELAY_S", 10 * HANG_TIMEOUT_S)
     with run_jetstream(tmp_path) as server:
-        async with open_store(nats_url_of(server)) as (_, store):
+        async with open_bucket(server) as (_, store):
             await store.put("sessions.a", b"1")
             await synchronised_keys(store)
             async with asyncio.timeout(HANG_TIMEOUT_S):
