@@ -135,4 +135,41 @@ describeInBrowser("drawing", { server: "open" }, ({ open }) => {
     expect(unsmoothed).toBeGreaterThan(50);
     expect(smoothed / unsmoothed).toBeLessThan(0.7);
   });
+
+  test("edges that reach the border of the picture leave no line on it", async () => {
+    const page = await open("", { colorScheme: "dark" });
+    await waitForFirstPose(page);
+    await pauseAtStart(page);
+    const differences = await evaluateInEngine(page, async () => {
+      const { stage } = globalThis.bunraku;
+      const { renderer, scene, audience } = stage;
+      const canvas = renderer.domElement;
+      /** Return the mean value of a row of the picture. */
+      const rowMean = (row: number) => {
+        const context = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d")!;
+        context.drawImage(canvas, 0, 0);
+        const { data } = context.getImageData(0, row, canvas.width, 1);
+        return data.reduce((sum, value) => sum + value, 0) / data.length;
+      };
+      const rows = [0, canvas.height - 1];
+      return new Promise<number[]>((resolve) => {
+        const draw = stage.draw.bind(stage);
+        stage.draw = (...state) => {
+          const { frame } = renderer.info.render;
+          // So near that the figure is higher than the picture.
+          audience.camera.zoom = 4;
+          audience.camera.updateProjectionMatrix();
+          draw(...state);
+          if (renderer.info.render.frame === frame) return;
+          stage.draw = draw;
+          const smoothed = rows.map(rowMean);
+          renderer.render(scene, audience.camera);
+          audience.camera.zoom = 1;
+          audience.camera.updateProjectionMatrix();
+          resolve(rows.map((row, at) => Math.abs(smoothed[at] - rowMean(row))));
+        };
+      });
+    });
+    expect(Math.max(...differences)).toBeLessThan(0.5);
+  });
 });

@@ -99,7 +99,10 @@ export class AudienceCamera {
   #uncoveredSpan: readonly [left: number, right: number] = [0, 1];
   #soloShift = 0;
   #viewShift = 0;
-  #appliedShift = 0;
+  /** Share of the picture's height that a sheet covers, then the current one. */
+  #targetSheetShare = 0;
+  #sheetShare = 0;
+  #appliedShift: readonly [x: number, y: number] = [0, 0];
   /** True until the first update after a cut: the camera takes its place without easing. */
   #isFirstFrame = true;
   readonly #audienceView = createView();
@@ -141,10 +144,11 @@ export class AudienceCamera {
 
   /**
    * Change the framing, eased over 0.6 s. A low window, or a sheet `sheetHeight` pixels high, hides a larger share of
-   * the picture at the bottom: the puppet is framed above it.
+   * the picture at the bottom: the puppet is framed above it, also by the motion's camera.
    */
   setFraming(framing: Framing, height: number, sheetHeight = 0): void {
     const [visible, look] = FRAMING_VIEWS[framing];
+    this.#targetSheetShare = framing === "sheet" ? Math.min(sheetHeight / height, 1 - MIN_FREE_SHARE / 2) : 0;
     const [controls, window] = BOTTOM_CONTROLS_PX[framing] ?? [0, 1];
     const coveredShare = Math.max(0, controls / height - controls / window);
     this.#targetFraming =
@@ -307,6 +311,7 @@ export class AudienceCamera {
     this.#isFirstFrame &&= this.#maxSideOffset === 0;
     this.#visibleHeight += (visible - this.#visibleHeight) * share;
     this.#lookHeight += (look - this.#lookHeight) * share;
+    this.#sheetShare += (this.#targetSheetShare - this.#sheetShare) * share;
     this.#sinceOrbitS += seconds;
     if (this.#sinceOrbitS > ORBIT_RETURN_DELAY_S) {
       const home = this.reducedMotion ? 1 : 1 - Math.exp(-3 * seconds);
@@ -334,21 +339,26 @@ export class AudienceCamera {
     this.#audienceView.fov = 2 * HALF_FOV_RAD;
   }
 
-  /** Apply the view to the camera. The audience view is already framed for the window's shape; the motion's is not. */
+  /**
+   * Apply the view to the camera. The audience view is already framed for the window's shape; that of the motion is
+   * framed here for what a sheet leaves uncovered.
+   */
   #applyView(): void {
     const { camera, view } = this;
     const share = MathUtils.smootherstep(this.#blendShare, 0, 1);
-    const fov = MathUtils.radToDeg(view.fov + share * (fovForAspect(view.fov, camera.aspect) - view.fov));
-    const shift = this.#viewShift * (1 - share);
+    const free = 1 - this.#sheetShare;
+    const fittedFov = 2 * Math.atan(Math.tan(fovForAspect(view.fov, camera.aspect / free) / 2) / free);
+    const fov = MathUtils.radToDeg(view.fov + share * (fittedFov - view.fov));
     const far = FAR_PLANE_M * this.distanceScale;
     if (Math.abs(fov - camera.fov) > 1e-9 || Math.abs(far - camera.far) > 1e-6) {
       Object.assign(camera, { fov, far });
       camera.updateProjectionMatrix();
     }
-    if (Math.abs(shift - this.#appliedShift) > 1e-6) {
+    const [x, y] = [this.#viewShift * (1 - share), (this.#sheetShare / 2) * share];
+    if (Math.hypot(x - this.#appliedShift[0], y - this.#appliedShift[1]) > 1e-6) {
       const { aspect } = camera;
-      camera.setViewOffset(aspect, 1, -shift * aspect, 0, aspect, 1);
-      this.#appliedShift = shift;
+      camera.setViewOffset(aspect, 1, -x * aspect, y, aspect, 1);
+      this.#appliedShift = [x, y];
     }
     camera.position.copy(view.position);
     camera.parent?.worldToLocal(camera.position);

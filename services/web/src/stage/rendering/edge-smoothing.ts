@@ -18,7 +18,7 @@ import {
   type WebGLRenderer,
 } from "three";
 import { type ScreenBox, unionOf } from "../camera/screen-box";
-import { bandsOf } from "./edge-bands";
+import { bandsOf, insideBorder } from "./edge-bands";
 
 const FRAGMENT_GLSL = /* glsl */ `
 uniform sampler2D picture; uniform vec2 texel;
@@ -77,15 +77,16 @@ export class EdgeSmoothing {
   /** Smooth what the canvas shows inside `boxes`, in shares of its width and height (0..1, y down). */
   apply(renderer: WebGLRenderer, boxes: readonly ScreenBox[]): void {
     const { width, height } = renderer.domElement;
-    const { left, bottom, columns, rows } = clipTo(width, height, unionOf(boxes), REACH_PX);
-    if (!(columns > 0 && rows > 0)) return;
+    const smoothed = insideBorder(boxes, width, height);
+    if (smoothed.length === 0) return;
+    const { left, bottom, columns, rows } = clipTo(width, height, unionOf(smoothed), REACH_PX);
     const { properties, state } = renderer;
     const gl = renderer.getContext();
     const picture = this.#fitTexture(width, height);
     renderer.initTexture(picture);
     state.bindTexture(gl.TEXTURE_2D, (properties.get(picture) as { __webglTexture: WebGLTexture }).__webglTexture);
     gl.copyTexSubImage2D(gl.TEXTURE_2D, 0, left, bottom, left, bottom, columns, rows);
-    this.#setBands(bandsOf(boxes, MAX_BANDS));
+    this.#setBands(bandsOf(smoothed, MAX_BANDS));
     const { autoClear } = renderer;
     renderer.autoClear = false;
     renderer.render(this.#mesh, this.#camera);

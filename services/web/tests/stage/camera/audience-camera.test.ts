@@ -61,6 +61,30 @@ describe("framing", () => {
     expect(pixelsAbove(audience, 1.75, 640)).toBeLessThan(640 - 75);
   });
 
+  test.each([340, 420, 490])("shows what the motion's camera shows above a sheet, %d pixels high", (sheet) => {
+    const [width, height, eye, fov] = [390, 844, 5, 0.45];
+    // The whole view of the motion's camera, from its top to its bottom, at the distance of its target.
+    const [top, bottom] = [1, -1].map((side) => 1.1 + side * eye * Math.tan(fov / 2));
+    const audience = createCamera("sheet", width, height);
+    audience.reducedMotion = false;
+    const motionCamera = [0, 1.1, eye, 0, 1.1, 0, fov];
+    const runFor = (seconds: number) => {
+      for (let at = 0; at < seconds; at += 1 / 60) audience.update(1 / 60, 0, motionCamera);
+    };
+    audience.setFraming("sheet", height, sheet);
+    runFor(3);
+    expect(pixelsAbove(audience, bottom, height)).toBeGreaterThan(sheet - 1);
+    expect(pixelsAbove(audience, top, height)).toBeLessThan(height + 1);
+    expect(pixelsAbove(audience, 1.1, height)).toBeCloseTo((height + sheet) / 2, 0);
+    // as before once the sheet is closed, and not at once
+    const before = pixelsAbove(audience, 1.1, height);
+    audience.setFraming("phone", height);
+    runFor(1 / 60);
+    expect(Math.abs(pixelsAbove(audience, 1.1, height) - before)).toBeLessThan(40);
+    runFor(3);
+    expect(pixelsAbove(audience, 1.1, height)).toBeCloseTo(height / 2, 0);
+  });
+
   test("shows a performer of twice the size in the same picture", () => {
     for (const y of [0, 0.9, 1.75]) {
       expect(pixelsAbove(createCamera("desktop", 800, 600, 2), 2 * y, 600)).toBeCloseTo(

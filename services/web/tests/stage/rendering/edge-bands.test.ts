@@ -1,5 +1,5 @@
 import { expect, test } from "vitest";
-import { bandsOf } from "../../../src/stage/rendering/edge-bands";
+import { bandsOf, insideBorder } from "../../../src/stage/rendering/edge-bands";
 
 test("bands are as wide as the boxes in them", () => {
   const boxes = [
@@ -28,4 +28,17 @@ test("all of each box is in the bands", () => {
     expect(Math.max(...bands.map((band) => band.bottom))).toBeGreaterThanOrEqual(bottom - 1e-9);
     expect(bands.every((band) => band.left <= left && band.right >= right)).toBe(true);
   }
+});
+
+test("pixels at the border are left out, and boxes beyond it", () => {
+  const boxes = [
+    { left: -0.5, top: 0.1, right: 0.3, bottom: 2 },
+    { left: 0.3, top: 0, right: 0.4, bottom: 0.5 },
+    { left: 0.2, top: -1, right: 0.4, bottom: 0.01 },
+    { left: 1, top: 0.2, right: 1.5, bottom: 0.4 },
+  ];
+  expect(insideBorder(boxes, 100, 50)).toEqual([
+    { left: 0.01, top: 0.1, right: 0.3, bottom: 0.98 },
+    { left: 0.3, top: 0.02, right: 0.4, bottom: 0.5 },
+  ]);
 });
