@@ -29,6 +29,7 @@ export function createCrowdControls(actions: CrowdActions): CrowdControls {
   const options = policies.map((policy) => element("option", { value: policy }, translate(POLICY_NAMES[policy])));
   const chooser = element("select", { class: "text-field" }, ...options);
   const effect = element("small");
+  const count = element("span", { class: "muted" });
   let performer = 0;
   let open: readonly number[] = [];
   const policy = () => chooser.value as CrowdPolicy;
@@ -47,8 +48,8 @@ export function createCrowdControls(actions: CrowdActions): CrowdControls {
   writeEffect();
   const details = element(
     "details",
-    { class: "crowd" },
-    element("summary", {}, translate("Let the audience pull")),
+    { class: "crowd strings-section" },
+    element("summary", {}, translate("Let the audience pull"), count),
     element(
       "div",
       { class: "crowd-limbs", role: "group", "aria-label": translate("Open to the audience") },
@@ -70,6 +71,7 @@ export function createCrowdControls(actions: CrowdActions): CrowdControls {
       performer = selected;
       const policyOf = (part: number) => limbs[limbNumber(performer, part)].crowd?.policy;
       open = LIMB_ORDER.filter((part) => policyOf(part)).map((part) => limbNumber(performer, part));
+      setText(count, open.length > 0 ? String(open.length) : "");
       for (const { part, button } of buttons) {
         setAttribute(button, "aria-pressed", String(policyOf(part) !== undefined));
         button.disabled = !ready;
@@ -101,7 +103,9 @@ function createQrToggle(createLink: () => Promise<string | null>): HTMLElement {
     else
       void Promise.all([import("./qr-picture"), createLink()]).then(
         ([{ createQrPicture }, link]) => {
-          if (link !== null) show(createQrPicture(link));
+          if (link === null) return;
+          show(createQrPicture(link));
+          place.scrollIntoView({ block: "nearest" });
         },
         () => show(translate("The QR code could not be loaded. Check your connection, then try again")),
       );

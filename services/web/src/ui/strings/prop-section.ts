@@ -58,7 +58,7 @@ export function createPropSection(actions: PropActions, { translate } = pageTran
   );
   const section = element(
     "details",
-    { class: "props" },
+    { class: "props strings-section" },
     element("summary", {}, translate("Props"), count),
     list,
     element("div", { class: "prop-adders", role: "group", "aria-label": translate("Add a prop") }, ...adders),
