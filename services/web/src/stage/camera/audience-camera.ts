@@ -99,6 +99,8 @@ export class AudienceCamera {
   #uncoveredSpan: readonly [left: number, right: number] = [0, 1];
   #soloShift = 0;
   #viewShift = 0;
+  /** Current share of the picture's width that the performers are framed in. */
+  #framedShare = 1;
   /** Share of the picture's height that a sheet covers, then the current one. */
   #targetSheetShare = 0;
   #sheetShare = 0;
@@ -297,7 +299,10 @@ export class AudienceCamera {
       soloDistance;
     this.distanceScale += (distanceGoal - this.distanceScale) * (this.#isFirstFrame ? 1 : share);
     const shift = this.#maxSideOffset > 0 ? this.#freeCentre : this.#soloShift;
-    this.#viewShift += (shift - this.#viewShift) * (this.#isFirstFrame && this.#maxSideOffset > 0 ? 1 : share);
+    const shiftStep = this.#isFirstFrame && this.#maxSideOffset > 0 ? 1 : share;
+    this.#viewShift += (shift - this.#viewShift) * shiftStep;
+    const framedShare = this.#maxSideOffset > 0 || this.#soloShift !== 0 ? this.#freeShare : 1;
+    this.#framedShare += (framedShare - this.#framedShare) * shiftStep;
     if (this.#selectedX !== null && !this.#isPanned) {
       const tolerance = MAX_SELECTED_OFFSET_M * this.scale;
       this.#targetSideOffset = MathUtils.clamp(
@@ -341,20 +346,21 @@ export class AudienceCamera {
 
   /**
    * Apply the view to the camera. The audience view is already framed for the window's shape; that of the motion is
-   * framed here for what a sheet leaves uncovered.
+   * framed here for what panels and a sheet leave uncovered.
    */
   #applyView(): void {
     const { camera, view } = this;
     const share = MathUtils.smootherstep(this.#blendShare, 0, 1);
-    const free = 1 - this.#sheetShare;
-    const fittedFov = 2 * Math.atan(Math.tan(fovForAspect(view.fov, camera.aspect / free) / 2) / free);
+    const freeHeight = 1 - this.#sheetShare;
+    const freeAspect = (camera.aspect * this.#framedShare) / freeHeight;
+    const fittedFov = 2 * Math.atan(Math.tan(fovForAspect(view.fov, freeAspect) / 2) / freeHeight);
     const fov = MathUtils.radToDeg(view.fov + share * (fittedFov - view.fov));
     const far = FAR_PLANE_M * this.distanceScale;
     if (Math.abs(fov - camera.fov) > 1e-9 || Math.abs(far - camera.far) > 1e-6) {
       Object.assign(camera, { fov, far });
       camera.updateProjectionMatrix();
     }
-    const [x, y] = [this.#viewShift * (1 - share), (this.#sheetShare / 2) * share];
+    const [x, y] = [this.#viewShift, (this.#sheetShare / 2) * share];
     if (Math.hypot(x - this.#appliedShift[0], y - this.#appliedShift[1]) > 1e-6) {
       const { aspect } = camera;
       camera.setViewOffset(aspect, 1, -x * aspect, y, aspect, 1);

@@ -1,6 +1,7 @@
 import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
 import type { AudienceCamera, Framing } from "../../../src/stage/camera/audience-camera";
+import { MIN_ASPECT } from "../../../src/stage/camera/view";
 import { createCamera, pixelsAbove, run, yaw } from "./framed-camera";
 
 describe("framing", () => {
@@ -164,6 +165,24 @@ test("the camera steps back from outstretched hands by an eighth at most", () =>
   expect(audience.camera.position.z / near).toBeCloseTo(1.12, 3);
   run(audience, 12, 0.2);
   expect(audience.camera.position.z / near).toBeCloseTo(1, 3);
+});
+
+test("what the motion's camera shows of several performers is between the panels", () => {
+  const [width, height, eye, fov] = [900, 600, 8, 0.6];
+  const audience = createCamera("desktop", width, height);
+  audience.reducedMotion = false;
+  audience.coveredSides = { left: 60, right: 356, width };
+  audience.placePerformers([
+    { x: -0.8, z: 0 },
+    { x: 0.8, z: 0 },
+  ]);
+  for (let t = 0; t < 3; t += 1 / 60) audience.update(1 / 60, 0, [0, 1, eye, 0, 1, 0, fov]);
+  // The sides of the narrowest picture that the camera was recorded for.
+  const half = eye * Math.tan(fov / 2) * MIN_ASPECT;
+  const pixels = (x: number) => (new Vector3(x, 1, 0).project(audience.camera).x * 0.5 + 0.5) * width;
+  expect(pixels(-half)).toBeGreaterThan(60 - 1);
+  expect(pixels(half)).toBeLessThan(width - 356 + 1);
+  expect(pixels(0)).toBeCloseTo((60 + width - 356) / 2, 0);
 });
 
 describe("a single performer", () => {
