@@ -45,7 +45,7 @@ const FREE_STRING: StringState = { puppeteer: null, isHighlighted: false, pullTa
 const DIMMED_SHARE = 0.42;
 /** Most threads of the audience's pulls, over all limbs. */
 const MAX_CROWD_THREADS = 64;
-const CROWD_THREAD = { alpha: 0.5, tension: 0, sag: 0.02, fadesOut: true };
+const CROWD_THREAD = { alpha: 0.85, tension: 0.12, sag: 0.02, fadesOut: true };
 const HIDDEN_POSITION = new Vector3();
 
 /** Lengths of the threads of free limbs, for hands and legs, in metres for the standard figure. */
