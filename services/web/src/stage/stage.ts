@@ -232,7 +232,9 @@ export class Stage {
   ): void {
     const { audience, rig } = this;
     const seconds = Math.min(interval, MAX_STEP_S);
-    this.#performerGroup.apply(poses, this.#reducedMotion ? 0 : seconds, clock);
+    const propSeconds = this.#reducedMotion ? Infinity : seconds;
+    const closed = this.#propGroup?.closeHands(poses, this.props, propSeconds) ?? poses;
+    this.#performerGroup.apply(closed, this.#reducedMotion ? 0 : seconds, clock);
     const { visiblePerformers } = this.#performerGroup;
     const hasPose = poses.some((pose) => pose !== null) && visiblePerformers.length > 0;
     if (hasPose) {
@@ -240,7 +242,7 @@ export class Stage {
       this.#floorHeight.value = rig.group.position.y;
     }
     rig.group.updateMatrixWorld(true);
-    this.#updateProps(seconds);
+    this.#updateProps(propSeconds);
     this.#updateAudience(hasPose ? visiblePerformers : [], seconds, motionCamera);
     // The scenery is as wide as the picture of all performers.
     const { distanceScale } = audience;
@@ -378,18 +380,13 @@ export class Stage {
     audience.update(seconds, reach, motionCamera);
   }
 
-  /** Show the props. Their code is loaded with the first. */
+  /** Show the props `seconds` later, with Infinity at once. Their code is loaded with the first. */
   #updateProps(seconds: number): void {
     if (!this.#propGroup) {
       if (this.props.length > 0) void this.#loadProps();
       return;
     }
-    const isNew = this.#propGroup.update(
-      this.props,
-      this.performers,
-      this.#floorHeight.value,
-      this.#reducedMotion ? Infinity : seconds,
-    );
+    const isNew = this.#propGroup.update(this.props, this.performers, this.#floorHeight.value, seconds);
     if (isNew) this.#compileShaders();
   }
 

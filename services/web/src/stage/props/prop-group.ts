@@ -14,6 +14,7 @@ import {
   Sphere,
   Vector3,
 } from "three";
+import type { StagedPose } from "../../motion/extension";
 import { PropMovement } from "../../motion/prop-movement";
 import {
   createPropTransform,
@@ -29,6 +30,7 @@ import type { PropPresence } from "../../wire/messages";
 import type { ScreenBox } from "../camera/screen-box";
 import type { ScreenProjection } from "../camera/screen-projection";
 import type { Performer } from "../puppet/performer";
+import { PropGrip } from "./prop-grip";
 import { createPropMaterial, SimplePropMaterial } from "./prop-material";
 import { createPropShape } from "./prop-shape";
 
@@ -48,6 +50,8 @@ export class PropGroup {
   readonly group = new Group();
   readonly #props = new Map<string, DrawnProp>();
   readonly #geometries = new Map<PropKind, BufferGeometry>();
+  /** Index: performer. */
+  readonly #grips: PropGrip[] = [];
   readonly #material = createPropMaterial();
   readonly #simpleMaterial = new SimplePropMaterial();
   #usesSimpleMaterials = false;
@@ -59,6 +63,19 @@ export class PropGroup {
   set usesSimpleMaterials(on: boolean) {
     this.#usesSimpleMaterials = on;
     for (const { mesh } of this.#props.values()) mesh.material = this.#currentMaterial;
+  }
+
+  /** Return the poses of the performers with their hands closed around what they hold; `seconds` as for `update`. */
+  closeHands(
+    poses: readonly (StagedPose | null)[],
+    props: readonly PropPresence[],
+    seconds: number,
+  ): readonly (StagedPose | null)[] {
+    return poses.map((pose, performer) => {
+      this.#grips[performer] ??= new PropGrip();
+      this.#grips[performer].update(props, performer, seconds);
+      return pose && this.#grips[performer].apply(pose);
+    });
   }
 
   /**
