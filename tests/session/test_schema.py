@@ -3,8 +3,11 @@ from __future__ import annotations
 import pytest
 from pydantic import ValidationError
 
+from bunraku.http.problem_details import validation_problem
 from bunraku.marionette.crowd.policy import CrowdPolicy
 from bunraku.session.schema import NewSession, SessionEdit
+from bunraku.wire.limbs import LIMBS, MAX_LIMBS
+from bunraku.wire.prop import MAX_PROPS
 
 
 def test_omitted_fields_of_an_edit_are_excluded() -> None:
@@ -28,6 +31,34 @@ def test_omitted_fields_of_an_edit_are_excluded() -> None:
 def test_edit_with_fraction_or_unknown_field_is_invalid(values: dict[str, object]) -> None:
     with pytest.raises(ValidationError):
         SessionEdit.model_validate(values)
+
+
+@pytest.mark.parametrize(
+    ("values", "field", "detail"),
+    [
+        ({"props": {"99": "fan"}}, "props.99", "there is no prop '99': props are 0 to 7"),
+        ({"props": {"\uff11": "fan"}}, "props.\uff11", "there is no prop"),
+        ({"props": {"01": "fan"}}, "props.01", "there is no prop"),
+        ({"crowd": {"77": "vote"}}, "crowd.77", "there is no limb '77': limbs are left_hand"),
+        # a digit of another script
+        ({"crowd": {"\uff10": "vote"}}, "crowd.\uff10", "there is no limb"),
+        ({"crowd": {"left_hand": "vote", "0": "turns"}}, "crowd", "left_hand and 0 are the same limb"),
+    ],
+)
+def test_wrong_key_of_an_edit_is_explained(values: dict[str, object], field: str, detail: str) -> None:
+    with pytest.raises(ValidationError) as invalid:
+        SessionEdit.model_validate(values)
+    problem = validation_problem(invalid.value)
+    assert problem.extra["field"] == field
+    assert problem.detail is not None
+    assert problem.detail.startswith(f"{field}: {detail}")
+
+
+def test_all_limbs_and_props_have_a_key() -> None:
+    crowd = {**dict.fromkeys(LIMBS, "vote"), **{str(number): "turns" for number in range(len(LIMBS), MAX_LIMBS)}}
+    edit = SessionEdit.model_validate({"crowd": crowd, "props": {str(number): "fan" for number in range(MAX_PROPS)}})
+    assert sorted(edit.open_limbs({})) == list(range(MAX_LIMBS))
+    assert sorted(edit.prop_kinds({})) == list(range(MAX_PROPS))
 
 
 def test_new_session_plays_and_loops_by_default() -> None:

@@ -115,7 +115,7 @@ async def test_any_replica_reaches_a_session(context: ServiceContext, replicas: 
     stage.send(ben, None)
     async with asyncio.timeout(HANG_TIMEOUT_S):
         # on a slow machine the last message has its turn in a later iteration of the event loop
-        while (await stage.describe())["puppeteers"]:
+        while (await stage.describe())["puppeteers"]:  # noqa: ASYNC110
             await asyncio.sleep(0)
     second = await other.open_session("one")
     for manager in (owner, other):

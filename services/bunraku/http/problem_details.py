@@ -53,7 +53,13 @@ def invalid_field_problem(location: tuple[int | str, ...], message: str) -> Prob
 def validation_problem(error: ValidationError) -> ProblemError:
     """Return the problem for the first error that pydantic has found in a request."""
     first = error.errors(include_url=False)[0]
-    return invalid_field_problem(first["loc"], first["msg"])
+    return _invalid_value_problem(first["loc"], first["msg"])
+
+
+def _invalid_value_problem(location: tuple[int | str, ...], message: str) -> ProblemError:
+    """Return the problem for an error of pydantic, without its marks for keys of mappings and for our own checks."""
+    path = location[:-1] if location[-1:] == ("[key]",) else location
+    return invalid_field_problem(path, message.removeprefix("Value error, "))
 
 
 def problem_response(problem: ProblemError, headers: dict[str, str] | None = None) -> JSONResponse:
@@ -94,7 +100,7 @@ def install_problem_handlers(app: FastAPI) -> None:
     @app.exception_handler(RequestValidationError)
     async def answer_invalid_request(_: Request, error: RequestValidationError) -> JSONResponse:
         first = error.errors()[0]
-        return problem_response(invalid_field_problem(first["loc"][1:], first["msg"]))
+        return problem_response(_invalid_value_problem(first["loc"][1:], first["msg"]))
 
     @app.exception_handler(HTTPException)
     async def answer_http_exception(request: Request, error: HTTPException) -> JSONResponse:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, FiniteFloat, field_validator
 
 from bunraku.http.problem_details import invalid_field_problem
 from bunraku.marionette.crowd.policy import CrowdPolicy
@@ -23,9 +23,30 @@ MAX_BONE_M = 3.0
 """Longest part of an offset or tip along one axis."""
 
 
-LimbKey = Annotated[str, Field(pattern=rf"^({'|'.join(LIMBS)}|\d|1[0-5])$")]
+_LIMB_NUMBERS = {name: number for number, name in enumerate(LIMBS)} | {str(n): n for n in range(MAX_LIMBS)}
+"""Numbers of limbs by their keys: names of the first performer's, and numbers in decimal."""
+_PROP_NUMBERS = {str(number): number for number in range(MAX_PROPS)}
+
+
+def _check_limb(key: str) -> str:
+    if key not in _LIMB_NUMBERS:
+        raise ValueError(f"there is no limb {key[:40]!r}: limbs are {', '.join(LIMBS)} and 0 to {MAX_LIMBS - 1}")
+    return key
+
+
+def _check_prop(key: str) -> str:
+    if key not in _PROP_NUMBERS:
+        raise ValueError(f"there is no prop {key[:40]!r}: props are 0 to {MAX_PROPS - 1}")
+    return key
+
+
+LimbKey = Annotated[
+    str,
+    AfterValidator(_check_limb),
+    Field(json_schema_extra={"pattern": rf"^({'|'.join(LIMBS)}|[0-9]|1[0-{MAX_LIMBS - 11}])$"}),
+]
 """Name of a limb of the first performer, or number of a limb in decimal."""
-PropKey = Annotated[str, Field(pattern=rf"^[0-{MAX_PROPS - 1}]$")]
+PropKey = Annotated[str, AfterValidator(_check_prop), Field(json_schema_extra={"pattern": rf"^[0-{MAX_PROPS - 1}]$"})]
 """Number of a prop in decimal."""
 
 
@@ -54,21 +75,28 @@ class SessionEdit(BaseModel):
             "null closes it",
         ),
     ] = {}
-
     props: Annotated[
         dict[PropKey, PropKind | None],
         Field(max_length=MAX_PROPS, description="kind of each prop to bring on the stage, by number; null removes it"),
     ] = {}
 
+    @field_validator("crowd")
+    @classmethod
+    def _refuse_contradictions(cls, crowd: dict[str, CrowdPolicy | None]) -> dict[str, CrowdPolicy | None]:
+        for name in crowd.keys() & set(LIMBS):
+            if str(_LIMB_NUMBERS[name]) in crowd:
+                raise ValueError(f"{name} and {_LIMB_NUMBERS[name]} are the same limb: leave one out")
+        return crowd
+
     def open_limbs(self, before: Mapping[int, str]) -> dict[int, str]:
         """Return the policies of the open limbs after this edit, by number."""
-        edits = {LIMBS.index(key) if key in LIMBS else int(key): policy for key, policy in self.crowd.items()}
+        edits = {_LIMB_NUMBERS[key]: policy for key, policy in self.crowd.items()}
         changed = {**before, **{limb: policy and policy.value for limb, policy in edits.items()}}
         return {limb: policy for limb, policy in changed.items() if policy is not None}
 
     def prop_kinds(self, before: Mapping[int, str]) -> dict[int, str]:
         """Return the kinds of the props after this edit, by number."""
-        changed = {**before, **{int(key): kind and kind.value for key, kind in self.props.items()}}
+        changed = {**before, **{_PROP_NUMBERS[key]: kind and kind.value for key, kind in self.props.items()}}
         return {number: kind for number, kind in changed.items() if kind is not None}
 
 
