@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-import multiprocessing
+import multiprocessing.util
 import os
 import signal
 import socket
@@ -195,12 +195,22 @@ def test_socket_of_the_worker_server_is_in_a_folder_that_is_swept() -> None:
     assert address.parent.parent == Path(tempfile.gettempdir())
 
 
-def test_environment_of_the_server_itself_is_unchanged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment_of_the_server_itself_is_unchanged(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def list_variables() -> str:
+        return subprocess.run(["env"], capture_output=True, text=True, check=True).stdout
+
     monkeypatch.setenv("BUNRAKU_SECRET", SECRET)
     with sandbox._restricted_environment():
-        assert os.environ["BUNRAKU_SECRET"] == SECRET
-        assert SECRET not in subprocess.run(["env"], capture_output=True, text=True, check=True).stdout
-    assert SECRET in subprocess.run(["env"], capture_output=True, text=True, check=True).stdout
+        assert SECRET in list_variables()
+        # other threads may change it while a worker starts
+        monkeypatch.setenv("BUNRAKU_CHANGED_MEANWHILE", "1")
+        script = f"import os; open({str(tmp_path / 'variables')!r}, 'w').write(repr(dict(os.environ)))"
+        child = multiprocessing.util.spawnv_passfds(sys.executable.encode(), [sys.executable, "-c", script], [])
+        assert os.waitpid(child, 0)[1] == 0
+    assert "BUNRAKU" not in (tmp_path / "variables").read_text()
+    assert "PATH" in (tmp_path / "variables").read_text()
+    assert SECRET in list_variables()
+    assert "BUNRAKU_CHANGED_MEANWHILE=1" in list_variables()
 
 
 def test_later_workers_do_not_load_the_c_library_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,19 +12,21 @@ import contextlib
 import ctypes
 import logging
 import math
-import multiprocessing
+import multiprocessing.util
 import os
 import resource
 import signal
 import stat
 import struct
+import subprocess
 import sys
 import threading
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from multiprocessing import forkserver
 from pathlib import Path
+from typing import Any
 
 from bunraku.runtime import landlock, seccomp
 from bunraku.runtime.compile_cache import PACKAGE_FOLDER
@@ -123,25 +125,25 @@ def _prepare_server() -> None:
 
 @contextmanager
 def _restricted_environment() -> Iterator[None]:
-    """Let processes that are started inherit only the variables of `ALLOWED_VARIABLES`.
+    """Let processes that multiprocessing starts get only the variables of `ALLOWED_VARIABLES`.
 
-    The pointer to the environment is replaced, as changes to the environment itself are not safe while other threads
-    read it. `os.environ` stays as it is.
+    They get an environment of their own, as that of the server cannot change safely while other threads use it.
     """
-    try:
-        environment = ctypes.c_void_p.in_dll(ctypes.pythonapi, "environ")
-    except ValueError:
-        _log.warning("The environment of workers cannot be restricted on this system")
-        yield
-        return
-    allowed = [name + b"=" + value for name, value in os.environb.items() if os.fsdecode(name) in ALLOWED_VARIABLES]
-    entries = (ctypes.c_char_p * (len(allowed) + 1))(*allowed, None)
-    previous = environment.value
-    environment.value = ctypes.addressof(entries)
+    spawn = multiprocessing.util.spawnv_passfds
+    multiprocessing.util.spawnv_passfds = _spawn_restricted
     try:
         yield
     finally:
-        environment.value = previous
+        multiprocessing.util.spawnv_passfds = spawn
+
+
+def _spawn_restricted(path: bytes, args: Sequence[Any], passfds: Sequence[int]) -> int:
+    """Start a program as `multiprocessing.util.spawnv_passfds` does, and return its process id."""
+    environment = {name: value for name, value in os.environ.items() if name in ALLOWED_VARIABLES}
+    process = subprocess.Popen(args, executable=path, env=environment, pass_fds=tuple(map(int, passfds)))
+    # the caller waits for its end
+    process.returncode = 0
+    return process.pid
 
 
 def _close_inherited_files(kept: int) -> None:
