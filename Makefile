@@ -91,7 +91,7 @@ simulate: .setup/python
 	$(BIN)/python -m tests.simulation --seed $(or $(SEED),0)
 
 test-web: .setup/page
-	cd services/web && npm run --silent check && npm test --silent -- $(FILES)
+	cd services/web && npm run --silent check && npm test --silent
 
 test: setup lint test-web test-python
 
