@@ -54,6 +54,8 @@ const MAX_SELECTED_OFFSET_M = 0.45;
 const PAN_SHARE_PER_RAD = 0.5;
 /** Minimum share of the picture's width left to the performers, whatever covers the sides. */
 const MIN_FREE_SHARE = 0.4;
+/** Largest share of the picture's height that a sheet is taken to cover: the rest stays for the performers. */
+const MAX_SHEET_SHARE = 0.8;
 /** A single performer moves out of the centre only if a side covers more than this share of the width. */
 const MAX_COVERED_SHARE = 0.35;
 const MAX_YAW_RAD = (25 * Math.PI) / 180;
@@ -150,7 +152,7 @@ export class AudienceCamera {
    */
   setFraming(framing: Framing, height: number, sheetHeight = 0): void {
     const [visible, look] = FRAMING_VIEWS[framing];
-    this.#targetSheetShare = framing === "sheet" ? Math.min(sheetHeight / height, 1 - MIN_FREE_SHARE / 2) : 0;
+    this.#targetSheetShare = framing === "sheet" ? Math.min(sheetHeight / height, MAX_SHEET_SHARE) : 0;
     const [controls, window] = BOTTOM_CONTROLS_PX[framing] ?? [0, 1];
     const coveredShare = Math.max(0, controls / height - controls / window);
     this.#targetFraming =
