@@ -17,7 +17,7 @@ from bunraku.capture.session import TimedPose
 from bunraku.capture_recorder import STATUS_INTERVAL_S, print_stage_address
 from bunraku.capture_stream import MAX_STREAM_FPS, PerformanceStream, StreamOptions
 from bunraku.motion.analysis import analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.skeleton import Motion
 from bunraku.terminal import call_when_stopped, err, print_statistics, run_request
@@ -32,7 +32,7 @@ def play_file(
     """
     try:
         analysis = analyse(parse_bvh(path.read_bytes()))
-    except UnreadableMotion as error:
+    except UnreadableFile as error:
         raise typer.BadParameter(f"{path}: {error}", param_hint="FILE") from None
     motion = analysis.motion
     # of a file that is too fast, frames are left out

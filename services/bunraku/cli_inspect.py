@@ -33,7 +33,7 @@ def inspect(
 ) -> None:
     """Show the skeleton of a motion file, the joints that were found, how well they fit, and the first pose."""
     from bunraku.motion.analysis import analyse
-    from bunraku.motion.errors import UnreadableMotion
+    from bunraku.motion.errors import UnreadableFile
     from bunraku.motion.readers.motion_file import read_motion
 
     if file.stat().st_size > MAX_FILE_BYTES:
@@ -44,7 +44,7 @@ def inspect(
     try:
         source = read_motion(file.read_bytes(), take)
         analysis = analyse(source)
-    except UnreadableMotion as error:
+    except UnreadableFile as error:
         err.print(str(error))
         raise typer.Exit(1) from None
     if as_json:

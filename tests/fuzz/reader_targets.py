@@ -1,6 +1,6 @@
 """Fuzzing targets: the readers of motion files, and invariants of every motion that they return.
 
-A target returns True if it accepts a file and False if it rejects it with `UnreadableMotion`. Any other exception is a
+A target returns True if it accepts a file and False if it rejects it with `UnreadableFile`. Any other exception is a
 failure. The reader of FBX is a compiled library that can end the process: its target is for a separate process.
 """
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.face import face_of
 from bunraku.motion.hands import CHAIN_COUNT
 from bunraku.motion.naming.expression_mapping import map_expressions
@@ -77,7 +77,7 @@ def check_fingers(motion: SourceMotion, frames: npt.NDArray[np.int64]) -> None:
     assert all(len(set(chain.path)) == len(chain.path) for chain in chains)
     if len(frames) < MAX_FRAMES:
         # the analysis converts all frames
-        with np.errstate(all="ignore"), contextlib.suppress(UnreadableMotion):
+        with np.errstate(all="ignore"), contextlib.suppress(UnreadableFile):
             hands = analyse(motion).hands
             assert hands is None or np.isfinite(hands.values).all()
 
@@ -85,7 +85,7 @@ def check_fingers(motion: SourceMotion, frames: npt.NDArray[np.int64]) -> None:
 def _accepts(read: Callable[[bytes], SourceMotion], data: bytes) -> bool:
     try:
         motion = read(data)
-    except UnreadableMotion:
+    except UnreadableFile:
         return False
     check_motion(motion)
     return True

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from bunraku.motion import rotation
 from bunraku.motion.analysis import Analysis, analyse
 from bunraku.motion.bvh_writer import write_bvh
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers import bvh
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, Figure, Motion, joint_and_tip_positions, world_transforms
@@ -152,7 +152,7 @@ def test_unknown_names_are_mapped_by_shape() -> None:
 def test_non_humanoid_skeleton_is_rejected() -> None:
     chain = b"HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 3 Zrotation Xrotation Yrotation\n"
     chain += b"JOINT b { OFFSET 0 1 0 CHANNELS 0 } } MOTION Frames: 1 Frame Time: 0.1\n0 0 0\n"
-    with pytest.raises(UnreadableMotion, match="two arms and two legs") as refusal:
+    with pytest.raises(UnreadableFile, match="two arms and two legs") as refusal:
         analyse(bvh.parse_bvh(chain))
     assert refusal.value.line == 1
 
@@ -253,7 +253,7 @@ def test_dance_far_away_is_moved_to_the_stage() -> None:
 @pytest.mark.parametrize(("distance", "frame", "said"), [(1e7, 1, "in frame 1 the body is"), (1e30, 0, "the origin")])
 def test_broken_positions_are_refused(distance: float, frame: int, said: str) -> None:
     source = bvh.parse_bvh(export_bvh(smooth_motion()))
-    with pytest.raises(UnreadableMotion, match=said) as caught:
+    with pytest.raises(UnreadableFile, match=said) as caught:
         analyse(far_away(source, distance, frame))
     assert (caught.value.title, caught.value.field) == ("Leaves the stage", source.names[0])
 

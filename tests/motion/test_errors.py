@@ -1,8 +1,8 @@
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 
 
 def test_message_contains_title_line_detail_and_hint() -> None:
-    error = UnreadableMotion("Two roots", "a second ROOT", line=7, field="b", hint="send one")
+    error = UnreadableFile("Two roots", "a second ROOT", line=7, field="b", hint="send one")
     assert str(error) == "Two roots: line 7: a second ROOT (send one)"
     assert (error.title, error.detail, error.line, error.field, error.hint) == (
         "Two roots",
@@ -11,7 +11,7 @@ def test_message_contains_title_line_detail_and_hint() -> None:
         "b",
         "send one",
     )
-    assert str(UnreadableMotion("Empty file", "nothing")) == "Empty file: nothing"
+    assert str(UnreadableFile("Empty file", "nothing")) == "Empty file: nothing"
 
 
 def test_quoted_excerpt_is_short_and_printable() -> None:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.naming.name_mapping import map_by_name
 from bunraku.motion.naming.shape_mapping import map_by_shape
 from bunraku.motion.rest_pose import resolve_sides
@@ -114,7 +114,7 @@ def _map_shape(names: list[str], parents: list[int], positions: Array) -> dict[s
     source = SampledMotion(tuple(names), tuple(parents), (), 30.0, positions, facing, positions[None], facing[None])
     try:
         return resolve_sides(source.positions, map_by_shape(source))[0]
-    except UnreadableMotion:
+    except UnreadableFile:
         return None
 
 

@@ -17,7 +17,7 @@ from bunraku.capture.source_pose import SourcePose, find_parents
 from bunraku.marionette.solver.vector import IDENTITY, ZERO, Quaternion, Vector, subtract
 from bunraku.motion import rotation
 from bunraku.motion.analysis import SourceFit, fit_source
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import Figure
 from bunraku.motion.source_motion import SampledMotion, chain_transforms
@@ -72,7 +72,7 @@ def calibrate(skeleton: CaptureSkeleton, frames: Sequence[CapturedFrame]) -> Cal
         with np.errstate(all="ignore"):
             fit = fit_source(source)
             figure = fit.build_figure()
-    except UnreadableMotion as error:
+    except UnreadableFile as error:
         raise UnreadableCapture(error.title, error.detail, field=error.field, hint=_REMEDY) from error
     except (ArithmeticError, ValueError, np.linalg.LinAlgError) as error:
         raise UnreadableCapture("Not a body", "the positions of the joints are degenerate", hint=_REMEDY) from error

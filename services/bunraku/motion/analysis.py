@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.extension import ExtendedPose
 from bunraku.motion.extension_fit import ExtensionMotion, extended_pose, fit_body_extension
 from bunraku.motion.face import Face, face_of, gaze_of_eyes, shows_gaze
@@ -122,7 +122,7 @@ def analyse(source: SourceMotion) -> Analysis:
     """Fit the 19 channels and a figure with the source's limb lengths to `source`.
 
     The figure's rest pose is H-Anim's I-pose, facing z, y up; elbows, wrists, knees, ankles and finger tips lie
-    straight below the previous joint, so that an elbow bends about -x and a knee about x. Raises `UnreadableMotion` if
+    straight below the previous joint, so that an elbow bends about -x and a knee about x. Raises `UnreadableFile` if
     the skeleton is not humanoid.
     """
     fitted = fit_source(source)
@@ -193,7 +193,7 @@ def _measure_extended(fit: FigureFit, pose: ExtendedPose, extension: ExtensionMo
 
 
 def fit_source(source: SourceMotion) -> SourceFit:
-    """Fit a figure and the rules of its joints to all frames of `source`. Raises `UnreadableMotion` as `analyse`."""
+    """Fit a figure and the rules of its joints to all frames of `source`. Raises `UnreadableFile` as `analyse`."""
     naming = map_by_name(source.names, source.parents) or map_by_shape(source)
     guessed = [*source.notes]
     frames = sample_frames(source)
@@ -265,7 +265,7 @@ def _starts_with_calibration_pose(fit: FigureFit) -> bool:
 def _move_to_stage(fit: FigureFit, assumptions: list[str]) -> Array:
     """Move the source if its feet are far from the floor or its middle from the stage; return by how much (3,), metres.
 
-    Raises `UnreadableMotion` if the motion leads too far away.
+    Raises `UnreadableFile` if the motion leads too far away.
     """
     moved = np.zeros(3)
     feet = [source for joint, source in fit.joints.items() if JOINTS[joint][2:] in ("ankle", "midtarsal")]
@@ -279,7 +279,7 @@ def _move_to_stage(fit: FigureFit, assumptions: list[str]) -> Array:
         apart = np.abs(root - start).max(axis=-1)
         if not apart.max() <= limit:
             frame = int(apart.argmax())
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Leaves the stage",
                 f"in frame {frame + 1} the body is {apart[frame]:.3g} m from {name}",
                 field=fit.source.names[fit.joints[0]],

@@ -1,10 +1,10 @@
-"""Errors of motion readers."""
+"""Errors of the readers of motions and props."""
 
 from __future__ import annotations
 
 
-class UnreadableMotion(Exception):
-    """Motion file that cannot be read, described for the person who sent it.
+class UnreadableFile(Exception):
+    """File that cannot be read, described for the person who sent it.
 
     The attributes are those of a problem document (RFC 9457) and this project's extensions: `title` the general
     problem, `detail` this occurrence, `line` the line number in the file, from 1, `field` the joint or keyword, `hint`

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import SourceMotion
@@ -99,7 +99,7 @@ def find_rest_pose(
     """Detect the rest pose of `source`; `joints` maps H-Anim joints to source indices.
 
     `position` (n, J, 3) and `orientation` (n, J, 4) are the sampled `frames` in the source's unit and axes. Raises
-    `UnreadableMotion` if the legs have no length.
+    `UnreadableFile` if the legs have no length.
     """
     guessed: list[str] = []
     unit, scale = _detect_unit(position, joints, source, guessed)
@@ -165,7 +165,7 @@ def _detect_unit(
 ) -> tuple[str, float]:
     """Return the unit and metres per unit: the declared one, unless it makes a body too small or too large.
 
-    Otherwise it is the unit in which a leg is nearest to `REFERENCE_LEG_M`. Raises `UnreadableMotion` if a bone of a
+    Otherwise it is the unit in which a leg is nearest to `REFERENCE_LEG_M`. Raises `UnreadableFile` if a bone of a
     leg has no length.
     """
     names, declared = source.names, source.metres_per_unit
@@ -180,7 +180,7 @@ def _detect_unit(
     leg = sum(lengths.values()) / len(lengths) * 2.0
     shortest = min(lengths, key=lengths.__getitem__)
     if not lengths[shortest] > MIN_BONE_SHARE * leg:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "A leg without length",
             f"{names[joints[shortest]]} is at the place of the joint above it",
             field=names[joints[shortest]],

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bunraku.motion.analysis import analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.naming.name_mapping import map_by_name
 from bunraku.motion.naming.shape_mapping import find_head, map_by_shape
 from bunraku.motion.readers import bvh
@@ -85,7 +85,7 @@ def test_body_with_one_pair_of_limbs_is_rejected_with_a_hint() -> None:
         offsets=source.offsets[keep],
         ends=tuple(end for end in source.ends if end.parent < len(keep)),
     )
-    with pytest.raises(UnreadableMotion, match="two arms and two legs") as refusal:
+    with pytest.raises(UnreadableFile, match="two arms and two legs") as refusal:
         map_by_shape(legs)
     assert refusal.value.field == "n0"
     assert "Mixamo" in refusal.value.hint

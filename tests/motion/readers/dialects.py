@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from bunraku.motion.analysis import Analysis, analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.skeleton import JOINT_INDEX, JOINTS, world_transforms
@@ -79,7 +79,7 @@ def check(case: Reads | Refused) -> None:
     """Assert that a file is read, or refused, as its table says."""
     data = case.data if isinstance(case.data, bytes) else case.data()
     if isinstance(case, Refused):
-        with pytest.raises(UnreadableMotion) as caught:
+        with pytest.raises(UnreadableFile) as caught:
             analyse(read_motion(data, case.take))
         error = caught.value
         assert (error.title, error.line, error.field) == (case.title, case.line, case.field), str(error)

@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers import bvh
 from bunraku.motion.readers.acclaim import parse_amc, parse_asf
 from tests.motion.readers.sources import write_acclaim
@@ -77,7 +77,7 @@ def test_radians_are_read() -> None:
 )
 def test_broken_skeletons_are_refused_with_the_line(old: bytes, new: bytes) -> None:
     assert old in ASF
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_asf(ASF.replace(old, new, 1))
     assert caught.value.title == "Broken Acclaim file"
     assert caught.value.line is not None
@@ -85,7 +85,7 @@ def test_broken_skeletons_are_refused_with_the_line(old: bytes, new: bytes) -> N
 
 
 def test_missing_bones_are_refused() -> None:
-    with pytest.raises(UnreadableMotion, match="No skeleton"):
+    with pytest.raises(UnreadableFile, match="No skeleton"):
         parse_asf(b":version 1.10\n")
 
 
@@ -100,7 +100,7 @@ def test_missing_bones_are_refused() -> None:
     ],
 )
 def test_broken_motions_are_refused_with_the_line(data: bytes, detail: str) -> None:
-    with pytest.raises(UnreadableMotion, match=detail) as caught:
+    with pytest.raises(UnreadableFile, match=detail) as caught:
         parse_amc(data, parse_asf(ASF))
     assert caught.value.line is not None
 
@@ -112,5 +112,5 @@ def test_bones_without_values_in_a_frame_are_at_rest_in_it() -> None:
 
 
 def test_motion_without_frames_is_refused() -> None:
-    with pytest.raises(UnreadableMotion, match="No motion"):
+    with pytest.raises(UnreadableFile, match="No motion"):
         parse_amc(b":DEGREES\n", parse_asf(ASF))

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bunraku.motion.bvh_writer import write_bvh
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.rotation import from_rotation_vector
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, Motion, standard_figure, world_transforms
@@ -48,15 +48,15 @@ def test_every_dialect_parses_like_the_plain_file(data: bytes) -> None:
 
 @pytest.mark.parametrize("data", [b"", b" \r\n\t", b"\xef\xbb\xbf"])
 def test_empty_file_is_rejected(data: bytes) -> None:
-    with pytest.raises(UnreadableMotion, match="Empty file") as caught:
+    with pytest.raises(UnreadableFile, match="Empty file") as caught:
         parse_bvh(data)
     assert caught.value.hint
 
 
 def test_broken_utf16_and_missing_channels_are_rejected() -> None:
-    with pytest.raises(UnreadableMotion, match="Broken text"):
+    with pytest.raises(UnreadableFile, match="Broken text"):
         parse_bvh(b"\xff\xfeH\x00I")
-    with pytest.raises(UnreadableMotion, match="No channels"):
+    with pytest.raises(UnreadableFile, match="No channels"):
         parse_bvh(b"HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 0\n}\nMOTION\nFrames: 1\nFrame Time: 1\n1\n")
 
 

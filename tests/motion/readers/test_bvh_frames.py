@@ -1,6 +1,6 @@
 import pytest
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh import parse_bvh
 from tests.motion.readers.bvh_samples import FIRST_FRAME_LINE, HIERARCHY_TEXT, ROWS, VALUES, motion_section
 
@@ -56,7 +56,7 @@ def test_irregular_header_is_tolerated_and_noted(data: bytes, frames: int, note:
     ],
 )
 def test_errors_name_line_and_remedy(data: bytes, title: str, line: int | None) -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_bvh(HIERARCHY_TEXT + data)
     assert caught.value.title == title
     assert caught.value.hint
@@ -65,6 +65,6 @@ def test_errors_name_line_and_remedy(data: bytes, title: str, line: int | None) 
 
 
 def test_long_word_is_rejected_with_a_short_message() -> None:
-    with pytest.raises(UnreadableMotion, match="Not a number") as caught:
+    with pytest.raises(UnreadableFile, match="Not a number") as caught:
         parse_bvh(HIERARCHY_TEXT + motion_section(b"x" * 20_000_000))
     assert len(str(caught.value)) < 300

@@ -1,6 +1,6 @@
 import pytest
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh_hierarchy import MAX_DEPTH, MAX_JOINTS, parse_hierarchy
 from tests.motion.readers.bvh_samples import HIERARCHY_TEXT, MOTION_LINE
 
@@ -94,20 +94,20 @@ def test_scale_channels_are_read() -> None:
 )
 def test_errors_name_line_and_remedy(old: bytes, new: bytes, title: str, line: int, field: str | None) -> None:
     assert old in HIERARCHY_WITH_MOTION
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_hierarchy(HIERARCHY_WITH_MOTION.replace(old, new, 1))
     assert (caught.value.title, caught.value.line, caught.value.field) == (title, line, field)
     assert caught.value.hint
 
 
 def test_a_million_joints_wide_or_deep_are_rejected() -> None:
-    with pytest.raises(UnreadableMotion, match="Too many joints") as caught:
+    with pytest.raises(UnreadableFile, match="Too many joints") as caught:
         parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"JOINT b { }\n" * 1_000_000)
     assert caught.value.line == 2 + MAX_JOINTS
-    with pytest.raises(UnreadableMotion, match="Too deep") as caught:
+    with pytest.raises(UnreadableFile, match="Too deep") as caught:
         parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"".join(b"JOINT b%d {\n" % i for i in range(1_000_000)))
     assert caught.value.line == 2 + MAX_DEPTH
-    with pytest.raises(UnreadableMotion, match="Too many End Sites"):
+    with pytest.raises(UnreadableFile, match="Too many End Sites"):
         parse_hierarchy(b"HIERARCHY\nROOT a {\n" + b"End Site { }\n" * 1_000_000)
 
 

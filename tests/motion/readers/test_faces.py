@@ -11,7 +11,7 @@ import pytest
 
 from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.face import EXPRESSION_INDEX, face_expressions
 from bunraku.motion.readers import node_motion
 from bunraku.motion.readers.bvh import Bvh, parse_bvh
@@ -189,7 +189,7 @@ def test_face_without_a_body_is_refused() -> None:
     glb = plain_glb()
     glb.animation["channels"] = []
     glb.add_morphs({"jawOpen": TALK}, FPS)
-    with pytest.raises(UnreadableMotion, match="Nothing moves"):
+    with pytest.raises(UnreadableFile, match="Nothing moves"):
         read_motion(glb.pack())
 
 
@@ -213,12 +213,12 @@ def test_too_many_weights_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     glb = plain_glb()
     glb.add_morphs({f"shape{number}": SMILE for number in range(40)}, FPS)
     monkeypatch.setattr(node_motion, "MAX_JOINT_FRAMES", 30 * FRAMES)
-    with pytest.raises(UnreadableMotion, match="Too much motion") as caught:
+    with pytest.raises(UnreadableFile, match="Too much motion") as caught:
         read_motion(glb.pack())
     assert "blend shapes" in caught.value.detail
     monkeypatch.undo()
     monkeypatch.setattr(node_motion, "MAX_SHAPES", 30)
-    with pytest.raises(UnreadableMotion, match="over 30 of them"):
+    with pytest.raises(UnreadableFile, match="over 30 of them"):
         read_motion(glb.pack())
 
 
@@ -229,7 +229,7 @@ def test_broken_weights_are_refused(values: Array, words: str) -> None:
     glb = plain_glb()
     node = glb.add_morphs({"jawOpen": TALK}, FPS)
     glb.animate(node, "weights", np.arange(FRAMES) / FPS, values)
-    with pytest.raises(UnreadableMotion, match=words):
+    with pytest.raises(UnreadableFile, match=words):
         read_motion(glb.pack())
 
 
@@ -243,7 +243,7 @@ def test_broken_weights_are_refused(values: Array, words: str) -> None:
 def test_expressions_of_missing_nodes_are_refused(extension: dict[str, Any]) -> None:
     glb = plain_glb()
     glb.document["extensions"] = extension
-    with pytest.raises(UnreadableMotion, match="Broken glTF file"):
+    with pytest.raises(UnreadableFile, match="Broken glTF file"):
         read_motion(glb.pack())
 
 
@@ -361,5 +361,5 @@ def test_skins_that_are_no_skins_are_ignored_or_refused(skin: object) -> None:
     glb.document["skins"] = [{}, {"joints": [0]}, {"joints": []}]
     glb.nodes[0]["name"] = ["a", "list"]
     glb.nodes[glb.add_morphs({"jawOpen": TALK}, FPS)]["skin"] = skin
-    with suppress(UnreadableMotion):
+    with suppress(UnreadableFile):
         read_motion(glb.pack())

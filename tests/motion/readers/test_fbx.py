@@ -7,7 +7,7 @@ import pytest
 
 from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.fbx import parse_fbx
 from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_INDEX, Motion, world_transforms
@@ -80,17 +80,17 @@ def test_takes_are_chosen_by_name() -> None:
     data = write_fbx(takes=("walk", "run"))
     assert parse_fbx(data, "run").notes == ("Of 2 takes, 'run' was read; the others are 'walk'.",)
     assert parse_fbx(data).notes == ("Of 2 takes, 'walk' was read; the others are 'run'.",)
-    with pytest.raises(UnreadableMotion, match="No such take"):
+    with pytest.raises(UnreadableFile, match="No such take"):
         parse_fbx(data, "jump")
 
 
 def test_files_without_animation_are_refused() -> None:
-    with pytest.raises(UnreadableMotion, match="No animation"):
+    with pytest.raises(UnreadableFile, match="No animation"):
         parse_fbx(write_fbx(takes=()))
 
 
 @pytest.mark.parametrize("data", [b"", b"Kaydara FBX Binary  \0\x1a\0", b"; FBX 7.3.0\n{{{{", bytes(1000)])
 def test_broken_files_are_refused(data: bytes) -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_fbx(data)
     assert caught.value.hint

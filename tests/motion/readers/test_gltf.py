@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bunraku.motion.analysis import analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers import bvh
 from bunraku.motion.readers.gltf import parse_gltf
 from tests.motion.readers.sources import pack_glb, unpack_glb, write_glb
@@ -33,7 +33,7 @@ def test_animation_is_chosen_by_name_or_size() -> None:
     assert chosen.notes == ("Of 2 takes, 'dance' was read; the others are 'idle'.",)
     # the root is left out of the second animation
     assert np.ptp(chosen.world_transforms([0, 1])[0][:, 1], axis=0).max() == 0.0
-    with pytest.raises(UnreadableMotion, match="No such take") as caught:
+    with pytest.raises(UnreadableFile, match="No such take") as caught:
         parse_gltf(data, "jump")
     assert "'idle', 'dance'" in caught.value.hint
 
@@ -118,7 +118,7 @@ def set_path(*path: str | int, value: object) -> Callable[[dict[str, Any]], obje
     ],
 )
 def test_broken_documents_are_refused_with_field_and_hint(change: Callable[[Any], object], title: str) -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_gltf(edited(change))
     assert caught.value.title == title
     assert caught.value.hint or caught.value.field
@@ -131,7 +131,7 @@ def test_times_are_checked(times: list[float], title: str) -> None:
     document = copy.deepcopy(DOCUMENT)
     for accessor in document["accessors"]:
         accessor["count"] = 2
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_gltf(pack_glb(document, bytes(binary)))
     assert caught.value.title == title
 
@@ -139,7 +139,7 @@ def test_times_are_checked(times: list[float], title: str) -> None:
 def test_values_that_are_no_numbers_are_refused() -> None:
     binary = bytearray(BINARY)
     struct.pack_into("<f", binary, DOCUMENT["bufferViews"][1]["byteOffset"], float("nan"))
-    with pytest.raises(UnreadableMotion, match="no numbers"):
+    with pytest.raises(UnreadableFile, match="no numbers"):
         parse_gltf(pack_glb(DOCUMENT, bytes(binary)))
 
 

@@ -7,7 +7,7 @@ import struct
 import numpy as np
 import pytest
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.gltf_file import GltfFile, parse_gltf_file
 from tests.motion.readers.sources import pack_glb
 
@@ -73,13 +73,13 @@ def test_strides_are_skipped() -> None:
     ],
 )
 def test_broken_containers_are_refused_with_a_hint(data: bytes, title: str) -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_gltf_file(data)
     assert caught.value.title == title
     assert caught.value.hint
 
 
 def test_line_of_broken_json_is_named() -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         parse_gltf_file(b'{"asset":\n{"version"}}')
     assert caught.value.line == 2

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bunraku.motion.analysis import Analysis, analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh import Bvh, parse_bvh
 from bunraku.motion.readers.motion_file import list_takes, read_motion
 from bunraku.motion.skeleton import world_transforms
@@ -107,7 +107,7 @@ def bvh_clip() -> bytes:
     ],
 )
 def test_archives_are_refused_with_a_hint(files: dict[str, bytes], take: str | None, title: str) -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         read_motion(write_zip(files), take)
     assert caught.value.title == title
     assert caught.value.hint
@@ -145,7 +145,7 @@ def test_each_listed_take_can_be_chosen(data: bytes, names: list[str]) -> None:
     for name in names:
         try:
             title = type(read_motion(data, name)).__name__
-        except UnreadableMotion as error:
+        except UnreadableFile as error:
             title = error.title
         assert title != "No such take"
 
@@ -159,7 +159,7 @@ def test_animation_of_a_file_of_an_archive_is_chosen_by_both_names() -> None:
     packed = write_zip({"a.glb": write_glb(SOURCE, animations=("idle", "dance")), "b.bvh": bvh_clip()})
     assert any("'dance' was read" in note for note in read_motion(packed, "a.glb/dance").notes)
     assert any("'idle' was read" in note for note in read_motion(packed, "a.glb").notes)
-    with pytest.raises(UnreadableMotion, match="No such take"):
+    with pytest.raises(UnreadableFile, match="No such take"):
         read_motion(packed, "a.glb/jump")
 
 
@@ -179,7 +179,7 @@ def test_animation_of_a_file_of_an_archive_is_chosen_by_both_names() -> None:
     ],
 )
 def test_other_files_are_refused_with_a_hint(data: bytes, title: str) -> None:
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         read_motion(data)
     assert caught.value.title == title
     assert caught.value.hint

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.node_motion import Interpolation, Node, Track, choose_rate, sample_nodes
 from bunraku.motion.rotation import Array
 
@@ -92,5 +92,5 @@ def test_rate_is_that_of_the_densest_track(tracks: list[Array], expected: float)
 @pytest.mark.parametrize(("end", "count"), [(1e6, 1), (5e3, 100), (float("inf"), 1)])
 def test_endless_motions_are_refused_before_they_are_sampled(end: float, count: int) -> None:
     nodes = [make_node(f"n{number}", number - 1, (0.0, 0.0, 0.0)) for number in range(count)]
-    with pytest.raises(UnreadableMotion, match="Too much motion"):
+    with pytest.raises(UnreadableFile, match="Too much motion"):
         sample_nodes(nodes, 0.0, end, 60.0, [])

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.takes import MAX_NAME_CHARACTERS, choose_take, describe_choice, name_takes
 
 
@@ -13,7 +13,7 @@ def test_largest_take_is_chosen_unless_one_is_named(sizes: list[int], take: str 
 
 def test_unknown_take_is_refused_with_the_known_ones() -> None:
     names = [f"take {number}" for number in range(30)]
-    with pytest.raises(UnreadableMotion) as caught:
+    with pytest.raises(UnreadableFile) as caught:
         choose_take(names, [1] * 30, "walk")
     assert caught.value.field == "take"
     assert "'take 19' and 10 more" in caught.value.hint

@@ -20,7 +20,7 @@ from bunraku.ingest.result import NOTHING_MOVES, JobRejection, JobResult
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import Analysis, analyse
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.readers.motion_file import list_takes, read_motion
 from bunraku.motion.readers.takes import TakeList
@@ -52,7 +52,7 @@ def encode_file(
         analysis = analyse(read_motion(path.read_bytes(), take))
         for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
             ArmRig(analysis.motion.figure, limb)
-    except UnreadableMotion as error:
+    except UnreadableFile as error:
         return _reject(error)
     except ProportionsError as error:
         detail = f"the arms of this skeleton cannot be controlled: {error}"
@@ -125,11 +125,11 @@ def list_file_takes(path: Path, limit: int, opens_files: bool = True) -> TakeLis
     """Return the first `limit` takes of the file at `path`, as `list_takes` does; none if it is one motion."""
     try:
         return list_takes(path.read_bytes(), limit, opens_files)
-    except UnreadableMotion as error:
+    except UnreadableFile as error:
         return _reject(error)
 
 
-def _reject(error: UnreadableMotion) -> JobRejection:
+def _reject(error: UnreadableFile) -> JobRejection:
     return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.joint_tree import ancestor_chain, common_ancestor, is_descendant
 from bunraku.motion.naming.name_mapping import SHAPE_PROFILE, JointMapping
 from bunraku.motion.rotation import Array
@@ -43,7 +43,7 @@ class _LimbCandidate:
 def map_by_shape(source: SourceMotion) -> JointMapping:
     """Return the mapping that the skeleton's shape gives, with sides not yet distinguished.
 
-    Raises `UnreadableMotion` if the skeleton does not have two pairs of limbs.
+    Raises `UnreadableFile` if the skeleton does not have two pairs of limbs.
     """
     parents = source.parents
     lengths = bone_lengths(source)
@@ -53,7 +53,7 @@ def map_by_shape(source: SourceMotion) -> JointMapping:
         (pair for pair in pairs if legs and all(_are_disjoint(a, b, parents) for a in pair for b in legs)), None
     )
     if legs is None or arms is None:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Not a humanoid",
             "neither the joints' names nor the skeleton's shape show two arms and two legs",
             line=source.joint_lines[0],

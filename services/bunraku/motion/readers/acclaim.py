@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import EndSite, SampledMotion, chain_transforms
 
@@ -50,7 +50,7 @@ class AcclaimSkeleton:
 
 
 def parse_asf(data: bytes) -> AcclaimSkeleton:
-    """Parse the skeleton of an ASF file. Raises `UnreadableMotion`."""
+    """Parse the skeleton of an ASF file. Raises `UnreadableFile`."""
     sections = _split_sections(data)
     radians = math.pi / 180.0
     for _, words in sections.get("units", ()):
@@ -65,12 +65,12 @@ def parse_asf(data: bytes) -> AcclaimSkeleton:
         if len(bones) > MAX_BONES:
             raise _broken(f"over {MAX_BONES:,} bones", bone.line)
     if len(bones) == 1:
-        raise UnreadableMotion("No skeleton", "the file has no bones", field=":bonedata", hint=_REMEDY)
+        raise UnreadableFile("No skeleton", "the file has no bones", field=":bonedata", hint=_REMEDY)
     return _order_bones(bones, sections.get("hierarchy", ()), radians, root_offset)
 
 
 def parse_amc(data: bytes, skeleton: AcclaimSkeleton) -> SampledMotion:
-    """Parse the frames of an AMC file for `skeleton`. Raises `UnreadableMotion`."""
+    """Parse the frames of an AMC file for `skeleton`. Raises `UnreadableFile`."""
     bones = skeleton.bones
     index = {bone.name: number for number, bone in enumerate(bones)}
     tracks = [array("d") for _ in bones]
@@ -81,7 +81,7 @@ def parse_amc(data: bytes, skeleton: AcclaimSkeleton) -> SampledMotion:
         elif len(words) == 1 and words[0].isdigit():
             count += 1
             if count * len(bones) > MAX_JOINT_FRAMES:
-                raise UnreadableMotion(
+                raise UnreadableFile(
                     "Too much motion",
                     f"over {MAX_JOINT_FRAMES:,} positions of bones",
                     line=line,
@@ -104,7 +104,7 @@ def parse_amc(data: bytes, skeleton: AcclaimSkeleton) -> SampledMotion:
             tracks[number].extend([0.0] * ((count - 1) * freedom - len(tracks[number])))
             tracks[number].extend(_numbers(words[1:], line))
     if count == 0:
-        raise UnreadableMotion("No motion", "the file has no frames", hint=_REMEDY)
+        raise UnreadableFile("No motion", "the file has no frames", hint=_REMEDY)
     angles = []
     for bone, track in zip(bones, tracks, strict=True):
         freedom = len(bone.dof)
@@ -252,8 +252,8 @@ def _order_bones(
 _REMEDY = "export it again; the skeleton (ASF) and the motion (AMC) belong together"
 
 
-def _broken(detail: str, line: int, hint: str = _REMEDY) -> UnreadableMotion:
-    return UnreadableMotion("Broken Acclaim file", detail, line=line, hint=hint)
+def _broken(detail: str, line: int, hint: str = _REMEDY) -> UnreadableFile:
+    return UnreadableFile("Broken Acclaim file", detail, line=line, hint=hint)
 
 
 def _numbers(words: Sequence[str], line: int, count: int | None = None) -> list[float]:

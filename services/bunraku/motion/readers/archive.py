@@ -8,7 +8,7 @@ import struct
 import zipfile
 import zlib
 
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 
 ZIP_MAGIC = b"PK\x03\x04"
 MAX_MEMBERS = 1_000
@@ -28,9 +28,9 @@ class Archive:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
             members = self._zip.infolist()
         except _ARCHIVE_ERRORS as error:
-            raise UnreadableMotion("Broken archive", "the zip file cannot be opened", hint="pack it again") from error
+            raise UnreadableFile("Broken archive", "the zip file cannot be opened", hint="pack it again") from error
         if len(members) > MAX_MEMBERS:
-            raise UnreadableMotion("Too many files", f"over {MAX_MEMBERS:,} of them", hint="pack fewer files")
+            raise UnreadableFile("Too many files", f"over {MAX_MEMBERS:,} of them", hint="pack fewer files")
         self._members = {member.filename: member for member in members if not member.filename.endswith("/")}
 
     def names(self, *suffixes: str) -> list[str]:
@@ -47,19 +47,19 @@ class Archive:
         return self._members[name].file_size
 
     def read(self, name: str) -> bytes:
-        """Return a file; raise `UnreadableMotion` if it is broken, encrypted or too large."""
+        """Return a file; raise `UnreadableFile` if it is broken, encrypted or too large."""
         member = self._members[name]
         if member.flag_bits & 1:
-            raise UnreadableMotion("Encrypted archive", "it has a password", field=name, hint="pack it without one")
+            raise UnreadableFile("Encrypted archive", "it has a password", field=name, hint="pack it without one")
         try:
             with self._zip.open(member) as file:
                 data = file.read(MAX_UNPACKED_BYTES + 1)
         except (*_ARCHIVE_ERRORS, zlib.error, EOFError) as error:
             detail = "a file cannot be unpacked"
-            raise UnreadableMotion("Broken archive", detail, field=name, hint="pack it again") from error
+            raise UnreadableFile("Broken archive", detail, field=name, hint="pack it again") from error
         if len(data) > MAX_UNPACKED_BYTES:
             detail = f"a file has over {MAX_UNPACKED_BYTES >> 20} MiB"
-            raise UnreadableMotion("Too large", detail, field=name, hint="cut it into shorter clips")
+            raise UnreadableFile("Too large", detail, field=name, hint="cut it into shorter clips")
         return data
 
     def find_skeleton(self, motion: str) -> str:
@@ -70,7 +70,7 @@ class Archive:
         if fitting:
             return max(fitting, key=lambda name: len(_stem(name)))
         if len(skeletons) != 1:
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "No skeleton",
                 f"no ASF file is named as {quote_excerpt(motion)}" if skeletons else "there is no ASF file",
                 field=motion,

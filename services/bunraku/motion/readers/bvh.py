@@ -2,7 +2,7 @@
 
 There is no standard; the common ground is Meredith and Maddock, "Motion Capture File Formats Explained" (2001). The
 reader accepts what exporters really write and reports its choices in `notes`; a file that it cannot read raises
-`UnreadableMotion` with the line number. Time and memory are linear in the size of the file, without recursion.
+`UnreadableFile` with the line number. Time and memory are linear in the size of the file, without recursion.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.readers.bvh_frames import parse_frames
 from bunraku.motion.readers.bvh_hierarchy import MAX_LENGTH, Hierarchy, parse_hierarchy
@@ -141,17 +141,15 @@ def _local_transform(bvh: Bvh, joint: int, values: Array, column: int) -> tuple[
 def parse_bvh(data: bytes) -> Bvh:
     """Parse a BVH file in UTF-8, UTF-16 with a byte order mark, or Latin-1.
 
-    Raises `UnreadableMotion` if the data is not a BVH file or contains no valid motion.
+    Raises `UnreadableFile` if the data is not a BVH file or contains no valid motion.
     """
     text = _normalise_text(data)
     if not text or text.isspace():
-        raise UnreadableMotion(
-            "Empty file", "the file has no content", hint="export the motion again and send that file"
-        )
+        raise UnreadableFile("Empty file", "the file has no content", hint="export the motion again and send that file")
     hierarchy = parse_hierarchy(text)
     width = sum(len(channels) for channels in hierarchy.channels)
     if width == 0:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "No channels", "no joint has a channel, so nothing can move", hint="export with rotations of the joints"
         )
     frames, frame_time, notes = parse_frames(text, hierarchy.motion_start, hierarchy.motion_line, width)
@@ -170,14 +168,14 @@ def parse_bvh(data: bytes) -> Bvh:
 
 
 def _check_range(hierarchy: Hierarchy, frames: Array) -> None:
-    """Raise `UnreadableMotion` for values beyond `MAX_ANGLE_DEG` and `MAX_LENGTH`."""
+    """Raise `UnreadableFile` for values beyond `MAX_ANGLE_DEG` and `MAX_LENGTH`."""
     owners = [(joint, channel) for joint, channels in enumerate(hierarchy.channels) for channel in channels]
     limits = [MAX_ANGLE_DEG if channel.endswith("rotation") else MAX_LENGTH for _, channel in owners]
     too_large = np.abs(frames) > limits
     if too_large.any():
         frame, column = np.argwhere(too_large)[0].tolist()
         joint, channel = owners[column]
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Value out of range",
             f"in frame {frame + 1}, {channel} is {frames[frame, column]:.3g}",
             field=hierarchy.names[joint],
@@ -197,7 +195,7 @@ def _normalise_text(data: bytes) -> bytes:
                 try:
                     data = data.decode(encoding).encode()
                 except UnicodeError as error:
-                    raise UnreadableMotion(
+                    raise UnreadableFile(
                         "Broken text", f"the file says it is {encoding.upper()}, but it is not", hint="save it as UTF-8"
                     ) from error
             break

@@ -7,7 +7,7 @@ import re
 
 import numpy as np
 
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 from bunraku.motion.readers.bvh_numbers import (
     DECIMAL_COMMA,
     NO_COMMA,
@@ -35,7 +35,7 @@ def parse_frames(text: bytes, start: int, line: int, channel_count: int) -> tupl
     """Return the channel values (n, `channel_count`), the frame time in seconds, and sentences about irregularities.
 
     `text` is the whole file (line feeds only), `start` the byte after the word MOTION, `line` the line of that word.
-    Raises `UnreadableMotion`.
+    Raises `UnreadableFile`.
     """
     notes: list[str] = []
     if text.find(b"#", start) >= 0 or text.find(b"//", start) >= 0:
@@ -80,7 +80,7 @@ def _parse_frame_time(word: bytes, line: int) -> float | None:
     except ValueError:
         seconds = math.nan
     if 0.0 < seconds < math.inf and not MIN_FRAME_TIME_S <= seconds <= MAX_FRAME_TIME_S:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Frame time out of range",
             f"{quote_excerpt(word)} is not between {MIN_FRAME_TIME_S} and {MAX_FRAME_TIME_S} seconds",
             line=line,
@@ -88,7 +88,7 @@ def _parse_frame_time(word: bytes, line: int) -> float | None:
             hint="write the seconds of one frame, such as 0.0333333",
         )
     if not math.isfinite(seconds):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Not a number",
             f"the frame time is {quote_excerpt(word)}",
             line=line,
@@ -107,7 +107,7 @@ def _detect_comma_role(text: bytes, position: int) -> int:
     return DECIMAL_COMMA
 
 
-def _invalid_value_error(text: bytes, position: int, line: int) -> UnreadableMotion:
+def _invalid_value_error(text: bytes, position: int, line: int) -> UnreadableFile:
     found = re.compile(rb"\S+").match(text, position)
     word = found.group() if found else b""
     lower = word.lower().lstrip(b"+-")
@@ -119,19 +119,19 @@ def _invalid_value_error(text: bytes, position: int, line: int) -> UnreadableMot
         title, hint = "Two motions in one file", "send one motion a file"
     else:
         title, hint = "Not a number", "a frame holds decimal numbers only"
-    return UnreadableMotion(title, f"{quote_excerpt(word)} is not a channel value", line=line, hint=hint)
+    return UnreadableFile(title, f"{quote_excerpt(word)} is not a channel value", line=line, hint=hint)
 
 
 def _count_complete_frames(
     lines: LineStatistics, declared: int | None, channel_count: int, line: int, notes: list[str]
 ) -> int:
-    """Return the number of complete frames; raise `UnreadableMotion` if the values are not frames of `channel_count`.
+    """Return the number of complete frames; raise `UnreadableFile` if the values are not frames of `channel_count`.
 
     `line` is the line of the first frame. Usually each line holds one frame, and every line is checked. If frames share
     lines or span several, only the total is checked.
     """
     if lines.word_count < channel_count:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "No whole frame",
             f"the channels take {channel_count} values a frame, and there are {lines.word_count} in all",
             line=line,
@@ -139,14 +139,14 @@ def _count_complete_frames(
         )
     whole, rest = divmod(lines.word_count, channel_count)
     if odd := _find_inconsistent_line(lines, declared, channel_count):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Wrong number of values",
             f"this line has {odd[1]} values, the channels take {channel_count}",
             line=line + odd[0],
             hint="every frame needs one value for each channel; check the CHANNELS lines against the export",
         )
     if rest and (lines.first_mismatch >= 0 or lines.nonblank_lines == 1) and (declared is None or whole >= declared):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Wrong number of values",
             f"{lines.word_count:,} values do not divide by the {channel_count} channels",
             line=line + (lines.first_mismatch if lines.first_mismatch >= 0 else lines.last_line),

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import EndSite
 
@@ -77,7 +77,7 @@ class _Tokenizer:
         rest = _NAME.match(self.text, self.position)
         name = rest.group().strip() if rest else b""
         if len(name) > MAX_NAME_BYTES:
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Name too long",
                 f"the name {quote_excerpt(name)} has over {MAX_NAME_BYTES} bytes",
                 line=self.line,
@@ -105,14 +105,14 @@ class _HierarchyBuilder:
 
 
 def parse_hierarchy(text: bytes) -> Hierarchy:
-    """Parse the joints of the BVH file `text` (line feeds only, ASCII-compatible). Raises `UnreadableMotion`."""
+    """Parse the joints of the BVH file `text` (line feeds only, ASCII-compatible). Raises `UnreadableFile`."""
     words = _Tokenizer(text)
     tree = _HierarchyBuilder()
     first = words.peek().lower()
     if first == b"hierarchy":
         words.next_token()
     elif first != b"root":
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Not a BVH file",
             f"it begins with {quote_excerpt(words.peek())}",
             line=words.line,
@@ -134,18 +134,18 @@ def parse_hierarchy(text: bytes) -> Hierarchy:
                 _parse_channels(tree, words)
             case b"}":
                 if not tree.stack:
-                    raise UnreadableMotion(
+                    raise UnreadableFile(
                         "Unbalanced braces", "this } closes nothing", line=line, hint="remove it or add the missing {"
                     )
                 tree.stack.pop()
             case b"motion":
                 break
             case b"":
-                raise UnreadableMotion(
+                raise UnreadableFile(
                     "No motion", "the file ends before the word MOTION", line=line, hint="the file may be cut short"
                 )
             case _:
-                raise UnreadableMotion(
+                raise UnreadableFile(
                     "Unknown word",
                     f"{quote_excerpt(word)} is not part of a BVH hierarchy",
                     line=line,
@@ -153,7 +153,7 @@ def parse_hierarchy(text: bytes) -> Hierarchy:
                 )
     if tree.stack:
         open_joint = next((joint for joint in reversed(tree.stack) if joint is not None), 0)
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Unbalanced braces",
             f"{len(tree.stack)} braces are still open at MOTION",
             line=words.line,
@@ -161,7 +161,7 @@ def parse_hierarchy(text: bytes) -> Hierarchy:
             hint="add the missing }",
         )
     if not tree.names:
-        raise UnreadableMotion("No joints", "the hierarchy has no ROOT", line=words.line, hint="export a skeleton")
+        raise UnreadableFile("No joints", "the hierarchy has no ROOT", line=words.line, hint="export a skeleton")
     names = _decode_names(tree.names)
     repeated = [name for name, count in Counter(names).items() if count > 1]
     if repeated:
@@ -181,7 +181,7 @@ def parse_hierarchy(text: bytes) -> Hierarchy:
 
 def _parse_root(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     if builder.names:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Two roots",
             "a second ROOT begins here",
             line=tokens.line,
@@ -195,7 +195,7 @@ def _parse_joint(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     line = tokens.line
     if not builder.stack or builder.stack[-1] is None:
         inside = "an End Site" if builder.stack else "no joint"
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Joint in the wrong place",
             f"this joint is inside {inside}",
             line=line,
@@ -209,11 +209,11 @@ def _open_joint(builder: _HierarchyBuilder, tokens: _Tokenizer, parent: int) -> 
     """Append a joint below `parent` and open its brace."""
     line = tokens.line
     if len(builder.names) >= MAX_JOINTS:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too many joints", f"over {MAX_JOINTS:,} joints", line=line, hint="export the body's joints only"
         )
     if len(builder.stack) >= MAX_DEPTH:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too deep", f"joints nested over {MAX_DEPTH} deep", line=line, hint="a } may be missing above"
         )
     name = tokens.next_name() or f"joint {len(builder.names)}".encode()
@@ -230,14 +230,14 @@ def _parse_end_site(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     line = tokens.line
     name = tokens.next_name()
     if not builder.stack or builder.stack[-1] is None:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "End Site in the wrong place",
             "this End Site belongs to no joint",
             line=line,
             hint="an End Site stands inside the last joint of a chain; check the braces above",
         )
     if len(builder.ends) >= MAX_JOINTS:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too many End Sites", f"over {MAX_JOINTS:,} of them", line=line, hint="export the body's joints only"
         )
     _expect_open_brace(tokens, name)
@@ -248,7 +248,7 @@ def _parse_end_site(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
 def _expect_open_brace(tokens: _Tokenizer, name: bytes) -> None:
     line = tokens.line
     if (word := tokens.next_token()) != b"{":
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Missing brace",
             f"no {{ after {quote_excerpt(name)}",
             line=line,
@@ -259,7 +259,7 @@ def _expect_open_brace(tokens: _Tokenizer, name: bytes) -> None:
 
 def _parse_offset(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     if not builder.stack:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "OFFSET in the wrong place",
             "this OFFSET belongs to no joint",
             line=tokens.line,
@@ -276,8 +276,8 @@ def _parse_offset(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
         builder.offsets[joint] = offset
 
 
-def _duplicate_keyword_error(keyword: str, line: int) -> UnreadableMotion:
-    return UnreadableMotion(
+def _duplicate_keyword_error(keyword: str, line: int) -> UnreadableFile:
+    return UnreadableFile(
         f"{keyword} twice",
         f"this joint has {keyword} already",
         line=line,
@@ -295,7 +295,7 @@ def _parse_number(tokens: _Tokenizer, line: int) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= MAX_LENGTH:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Not a number",
             f"OFFSET needs three numbers within {MAX_LENGTH:.0e}, not {quote_excerpt(word)}",
             line=line,
@@ -309,7 +309,7 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
     line = tokens.line
     joint = builder.stack[-1] if builder.stack else None
     if joint is None:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "CHANNELS in the wrong place",
             "these CHANNELS belong to no joint",
             line=line,
@@ -319,7 +319,7 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
         raise _duplicate_keyword_error("CHANNELS", line)
     word = tokens.next_token()
     if not word.isdigit() or len(word) > 3:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Not a number",
             f"CHANNELS needs a count, not {quote_excerpt(word)}",
             line=line,
@@ -337,7 +337,7 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
         detail = f"CHANNELS says {count}, but {len(found)} follow" + (
             "" if known else f", then {quote_excerpt(following)}"
         )
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Wrong number of channels",
             detail,
             line=line,
@@ -345,7 +345,7 @@ def _parse_channels(builder: _HierarchyBuilder, tokens: _Tokenizer) -> None:
             hint="name as many of Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation as it counts",
         )
     if len(set(found)) != len(found):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Channel named twice",
             "a joint has each channel once at most",
             line=line,

@@ -13,7 +13,7 @@ import numpy as np
 import ufbx
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 from bunraku.motion.readers.node_motion import (
     Node,
     NodeMotion,
@@ -50,7 +50,7 @@ _BONELESS = {ufbx.ElementType.MESH, ufbx.ElementType.CAMERA, ufbx.ElementType.LI
 def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
     """Parse the take (animation stack) `take` of an FBX file, by default the one that moves most.
 
-    Raises `UnreadableMotion` if the data is not an FBX file or has no such take. A file that crashes ufbx ends the
+    Raises `UnreadableFile` if the data is not an FBX file or has no such take. A file that crashes ufbx ends the
     process: parse in a separate process.
     """
     with _uncollected() as keep:
@@ -59,7 +59,7 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
             scene = _load_scene(data, keep, **_CONVERSION_OPTIONS)
         stacks = [keep(stack) for stack in keep(scene.anim_stacks)]
         if not stacks:
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "No animation", "the file has a model, but no animation", hint="export it with its animation"
             )
         curves = [_moving_curves(stack, keep) for stack in stacks]
@@ -69,12 +69,12 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
         if not times:
             detail = f"the take {quote_excerpt(names[chosen])} moves nothing"
             hint = "export it with the animation of its joints"
-            raise UnreadableMotion("Nothing moves", detail, field=names[chosen], hint=hint)
+            raise UnreadableFile("Nothing moves", detail, field=names[chosen], hint=hint)
         start, end = _find_span(stacks[chosen], times)
         nodes, elements = _read_nodes(scene, keep)
         if len(nodes) < 2:
             detail = "none of its objects is a joint"
-            raise UnreadableMotion("No skeleton", detail, hint="export it with its skeleton (armature, bones)")
+            raise UnreadableFile("No skeleton", detail, hint="export it with its skeleton (armature, bones)")
         notes = [*describe_choice(names, chosen), *_describe_muted_layers(stacks[chosen], keep)]
         unit = _read_unit(keep(scene.settings), keep)
         motion = sample_nodes(nodes, start, end, choose_rate(times), notes, unit)
@@ -85,7 +85,7 @@ def parse_fbx(data: bytes, take: str | None = None) -> NodeMotion:
 
 
 def list_fbx_takes(data: bytes) -> list[str]:
-    """Return the names of a file's takes. Raises `UnreadableMotion` if the data is not an FBX file.
+    """Return the names of a file's takes. Raises `UnreadableFile` if the data is not an FBX file.
 
     A file that crashes ufbx ends the process.
     """
@@ -98,7 +98,7 @@ def _load_scene(data: bytes, keep: _Keep, **options: Any) -> ufbx.Scene:
         return keep(ufbx.load_memory(data, **_LOAD_OPTIONS, **options))
     except (ufbx.UfbxError, ValueError) as error:
         detail = str(error) or type(error).__name__
-        raise UnreadableMotion("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
+        raise UnreadableFile("Broken FBX file", detail, hint="export it again, as FBX 2014 or later") from error
 
 
 def _take_names(stacks: Sequence[ufbx.AnimStack]) -> list[str]:
@@ -186,7 +186,7 @@ def _read_nodes(scene: ufbx.Scene, keep: _Keep) -> tuple[list[Node], list[ufbx.N
             kept.add(above)
             above = parents[above]
     if len(kept) > MAX_NODES:
-        raise UnreadableMotion("Too many joints", f"over {MAX_NODES:,} joints", hint="export the body's joints only")
+        raise UnreadableFile("Too many joints", f"over {MAX_NODES:,} joints", hint="export the body's joints only")
     order = sorted(kept, key=lambda number: (everything[number].node_depth, number))
     place = {number: index for index, number in enumerate(order)}
     nodes = []
@@ -207,7 +207,7 @@ def _sample_tracks(animation: ufbx.Anim, motion: NodeMotion, elements: Sequence[
             ]
         )
         if not (np.abs(sampled) <= MAX_VALUE).all():
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Broken FBX file",
                 f"its animation has values that are no numbers, or beyond {MAX_VALUE:.0e}",
                 field=node.name,
@@ -239,7 +239,7 @@ def _sample_blend_shapes(
         name = channel.name or f"blend shape {number}"
         weights = np.array([ufbx.evaluate_blend_weight(animation, channel, time) for time in motion.times.tolist()])
         if not (np.abs(weights) <= MAX_VALUE).all():
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Broken FBX file",
                 f"a weight is no number, or beyond {MAX_VALUE:.0e}",
                 field=name,

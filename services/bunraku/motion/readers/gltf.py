@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 from bunraku.motion.readers.gltf_face import (
     WEIGHTS,
     find_expression_nodes,
@@ -43,12 +43,12 @@ _HUMANOIDS = (("VRMC_vrm_animation", "humanoid"), ("VRMC_vrm", "humanoid"), ("VR
 def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
     """Parse the animation `take` of an asset, by default the one that moves most nodes.
 
-    Raises `UnreadableMotion` if the data is no glTF asset or has no such animation.
+    Raises `UnreadableFile` if the data is no glTF asset or has no such animation.
     """
     file = parse_gltf_file(data)
     animations = file.items("animations")
     if not animations:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "No animation", "the file has a model, but no animation", hint="export it with its animation"
         )
     names = _take_names(animations)
@@ -64,7 +64,7 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
         # only the face moves
         times = [track.times for track in tracks.values()]
     if not nodes or not times:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Nothing moves",
             f"the animation {quote_excerpt(names[chosen])} moves no node",
             field=names[chosen],
@@ -76,7 +76,7 @@ def parse_gltf(data: bytes, take: str | None = None) -> NodeMotion:
 
 
 def list_gltf_takes(data: bytes) -> list[str]:
-    """Return the names of an asset's animations. Raises `UnreadableMotion` if the data is no glTF asset."""
+    """Return the names of an asset's animations. Raises `UnreadableFile` if the data is no glTF asset."""
     return _take_names(parse_gltf_file(data).items("animations"))
 
 
@@ -170,7 +170,7 @@ def _read_nodes(file: GltfFile, moved: set[int]) -> tuple[list[Node], dict[int, 
         wanted.update(file.check_index("nodes", joint) for joint in joints)
     order = _order_nodes(wanted, parents)
     if len(order) > MAX_NODES:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too many joints", f"over {MAX_NODES:,} joints", field="nodes", hint="export the body's joints only"
         )
     roots = [index for index in order if parents[index] < 0]
@@ -188,7 +188,7 @@ def _read_nodes(file: GltfFile, moved: set[int]) -> tuple[list[Node], dict[int, 
 
 
 def _find_parents(file: GltfFile) -> list[int]:
-    """Return the parent of each node, -1 for roots; raise `UnreadableMotion` unless they are a tree."""
+    """Return the parent of each node, -1 for roots; raise `UnreadableFile` unless they are a tree."""
     items = file.items("nodes")
     parents = [-1] * len(items)
     for index, item in enumerate(items):

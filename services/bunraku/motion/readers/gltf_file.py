@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 from bunraku.motion.rotation import Array
 
 GLB_MAGIC = b"glTF"
@@ -66,7 +66,7 @@ class GltfFile:
             raise broken(where, f"count is {quote_excerpt(str(count))}")
         self._values_read += count * components
         if self._values_read > MAX_VALUES:
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Too much motion", f"over {MAX_VALUES:,} numbers", field=where, hint="cut it into shorter animations"
             )
         if "bufferView" in accessor:
@@ -110,9 +110,9 @@ class GltfFile:
         view = self.item("bufferViews", accessor["bufferView"])
         where = f"bufferViews[{accessor['bufferView']}]"
         if "EXT_meshopt_compression" in view.get("extensions", {}):
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Compressed file",
-                "its animation is compressed with EXT_meshopt_compression",
+                "its data is compressed with EXT_meshopt_compression",
                 field=where,
                 hint="export it without compression (gltfpack: -noq, without -c)",
             )
@@ -138,7 +138,7 @@ class GltfFile:
         if (known := self._buffers.get(number)) is not None:
             return known
         if not isinstance(uri, str) or not uri.startswith(_DATA_URI):
-            raise UnreadableMotion(
+            raise UnreadableFile(
                 "Not one file",
                 f"its data is in another file, {quote_excerpt(str(uri))}",
                 field=f"buffers[{index}]",
@@ -152,10 +152,10 @@ class GltfFile:
 
 
 def parse_gltf_file(data: bytes) -> GltfFile:
-    """Parse a GLB file, or a glTF file in JSON. Raises `UnreadableMotion`."""
+    """Parse a GLB file, or a glTF file in JSON. Raises `UnreadableFile`."""
     text, binary = (data, b"") if not data.startswith(GLB_MAGIC) else _split_chunks(data)
     if text.count(b",") + text.count(b"[") + text.count(b"{") > MAX_JSON_ITEMS:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too large",
             f"its JSON part has over {MAX_JSON_ITEMS:,} items",
             hint="export the skeleton and its motion only",
@@ -164,11 +164,11 @@ def parse_gltf_file(data: bytes) -> GltfFile:
         document = json.loads(text.decode("utf-8-sig"))
     except (UnicodeDecodeError, ValueError, RecursionError) as error:
         line = error.lineno if isinstance(error, json.JSONDecodeError) else None
-        raise UnreadableMotion("Not a glTF file", "its JSON part is broken", line=line, hint=_REEXPORT) from error
+        raise UnreadableFile("Not a glTF file", "its JSON part is broken", line=line, hint=_REEXPORT) from error
     asset = document.get("asset") if isinstance(document, dict) else None
     version = asset.get("version") if isinstance(asset, dict) else None
     if not isinstance(version, str) or not version.startswith("2."):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Not a glTF 2 file", f"its version is {quote_excerpt(str(version))}", field="asset.version", hint=_REEXPORT
         )
     return GltfFile(document, binary)
@@ -177,12 +177,12 @@ def parse_gltf_file(data: bytes) -> GltfFile:
 def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
     """Return the JSON and binary chunks of a GLB file."""
     if len(data) < _HEADER.size + _CHUNK.size:
-        raise UnreadableMotion("Cut short", "the file ends in its header", hint=_REEXPORT)
+        raise UnreadableFile("Cut short", "the file ends in its header", hint=_REEXPORT)
     _, version, length = _HEADER.unpack_from(data)
     if version != 2:
-        raise UnreadableMotion("Not a glTF 2 file", f"its version is {version}", hint=_REEXPORT)
+        raise UnreadableFile("Not a glTF 2 file", f"its version is {version}", hint=_REEXPORT)
     if length > len(data):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Cut short", f"the file says it has {length:,} bytes, but {len(data):,} are there", hint="send it again"
         )
     chunks: dict[bytes, bytes] = {}
@@ -218,9 +218,9 @@ def _look_up(table: Mapping[Any, _Value], key: object) -> _Value | None:
     return table.get(key) if isinstance(key, int | str) else None
 
 
-def broken(field: str, detail: str) -> UnreadableMotion:
+def broken(field: str, detail: str) -> UnreadableFile:
     """Return the error of an asset that contradicts the specification."""
-    return UnreadableMotion("Broken glTF file", detail, field=field, hint=_REEXPORT)
+    return UnreadableFile("Broken glTF file", detail, field=field, hint=_REEXPORT)
 
 
 def _whole(item: dict[str, Any], name: str, default: int, where: str) -> int:

@@ -7,7 +7,7 @@ import posixpath
 import re
 from dataclasses import replace
 
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.readers.acclaim import parse_amc, parse_asf
 from bunraku.motion.readers.archive import MOTION_SUFFIXES, ZIP_MAGIC, Archive
 from bunraku.motion.readers.bvh import Bvh, parse_bvh
@@ -34,7 +34,7 @@ def read_motion(data: bytes, take: str | None = None) -> AnyMotion:
     """Parse a motion file: BVH, FBX, glTF, VRM, VRMA, or a zip archive of such files or of ASF and AMC.
 
     `take` chooses an animation of a file, or a file of an archive, by its name: `FILE/ANIMATION` is an animation of a
-    file of an archive. Raises `UnreadableMotion`.
+    file of an archive. Raises `UnreadableFile`.
     """
     start = data[:START_BYTES]
     if start.startswith(ZIP_MAGIC):
@@ -44,17 +44,17 @@ def read_motion(data: bytes, take: str | None = None) -> AnyMotion:
     if _is_fbx(start):
         return parse_fbx(data, take)
     if len(start) > 1 and start[0] in C3D_PARAMETERS and start[1] == C3D_MAGIC:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Markers, not joints",
             "C3D files have the positions of markers",
             hint="solve a skeleton in the capture software, and export it as FBX or BVH",
         )
     if _AMC.search(start):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Motion without skeleton", "an AMC file has no skeleton", hint="send it with its ASF file, in a zip archive"
         )
     if _ASF.search(start):
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Skeleton without motion", "an ASF file has no motion", hint="send it with its AMC file, in a zip archive"
         )
     return parse_bvh(data)
@@ -64,7 +64,7 @@ def list_takes(data: bytes, limit: int, opens_files: bool = True) -> TakeList:
     """Return the first `limit` takes of a motion file; none if the file is one motion.
 
     Without `opens_files`, no reader of a format is called: each file of an archive is one take, and another file one
-    motion. Raises `UnreadableMotion` if the file cannot be opened. A take that is listed may be unreadable.
+    motion. Raises `UnreadableFile` if the file cannot be opened. A take that is listed may be unreadable.
     """
     if data.startswith(ZIP_MAGIC):
         names = _list_archive(Archive(data), limit if opens_files else 0)
@@ -82,7 +82,7 @@ def _list_archive(archive: Archive, limit: int) -> list[str]:
     for label, path in _label_files(archive).items():
         animations: list[str] = []
         if len(names) < limit and not path.lower().endswith(".amc"):
-            with contextlib.suppress(UnreadableMotion):
+            with contextlib.suppress(UnreadableFile):
                 animations = _list_animations(archive.read(path))
         names += [f"{label}/{name}" for name in animations] if len(animations) > 1 else [label]
     return names
@@ -110,7 +110,7 @@ def _read_archive(archive: Archive, take: str | None) -> AnyMotion:
     else:
         data = archive.read(path)
         if data.startswith(ZIP_MAGIC):
-            raise UnreadableMotion("Archive in an archive", "it is not opened", field=path, hint="unpack it first")
+            raise UnreadableFile("Archive in an archive", "it is not opened", field=path, hint="unpack it first")
         motion = read_motion(data, inner)
     return replace(motion, notes=(*motion.notes, *describe_choice(names, chosen)))
 
@@ -119,7 +119,7 @@ def _label_files(archive: Archive) -> dict[str, str]:
     """Return the paths of an archive's motion files by their file names, or by paths if these are not unique."""
     paths = archive.names(*MOTION_SUFFIXES)
     if not paths:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "No motion",
             "the archive has no motion file",
             hint="pack BVH, FBX, GLB or VRMA files, or AMC files with their ASF",

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.motion import rotation
-from bunraku.motion.errors import UnreadableMotion
+from bunraku.motion.errors import UnreadableFile
 from bunraku.motion.joint_tree import ancestor_chain
 from bunraku.motion.rotation import Array
 from bunraku.motion.source_motion import NTSC_RATES, EndSite
@@ -222,15 +222,15 @@ def sample_nodes(
     notes: Sequence[str],
     metres_per_unit: float | None = None,
 ) -> NodeMotion:
-    """Return the motion of `nodes` from `start` to `end`, in seconds; raise `UnreadableMotion` if it is too much."""
+    """Return the motion of `nodes` from `start` to `end`, in seconds; raise `UnreadableFile` if it is too much."""
     duration = end - start
     if not np.isfinite(duration) or duration * fps > MAX_FRAMES:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too much motion", f"it lasts {duration:.3g} s", hint="cut the animation to the part that is performed"
         )
     frame_count = int(np.floor(duration * fps + 1e-3)) + 1
     if frame_count * len(nodes) > MAX_JOINT_FRAMES:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too much motion",
             f"{frame_count:,} frames of {len(nodes)} joints are more than {MAX_JOINT_FRAMES:,}",
             hint="cut the animation into shorter ones, or export the body's joints only",
@@ -239,15 +239,15 @@ def sample_nodes(
 
 
 def check_shape_frames(frame_count: int, shape_count: int) -> None:
-    """Raise `UnreadableMotion` if there are too many blend shapes, or too many weights of them."""
+    """Raise `UnreadableFile` if there are too many blend shapes, or too many weights of them."""
     if shape_count > MAX_SHAPES:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too much motion",
             f"over {MAX_SHAPES:,} of them move",
             hint="export the blend shapes of the face only",
         )
     if frame_count * shape_count > MAX_JOINT_FRAMES:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "Too much motion",
             f"{frame_count:,} frames of {shape_count:,} blend shapes are more than {MAX_JOINT_FRAMES:,}",
             hint="cut the animation into shorter ones, or export the blend shapes of the face only",

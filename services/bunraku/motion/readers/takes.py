@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from bunraku.motion.errors import UnreadableMotion, quote_excerpt
+from bunraku.motion.errors import UnreadableFile, quote_excerpt
 
 MAX_NAME_CHARACTERS = 200
 """Characters of a name beyond which it is cut."""
@@ -39,12 +39,12 @@ def name_takes(names: Iterable[str]) -> list[str]:
 def choose_take(names: Sequence[str], sizes: Sequence[int], take: str | None) -> int:
     """Return the index of the motion called `take`, or of the largest if it is None; the first of equal ones.
 
-    Raises `UnreadableMotion` if there is none.
+    Raises `UnreadableFile` if there is none.
     """
     if take is None:
         return max(range(len(names)), key=lambda index: (sizes[index], -index))
     if take not in names:
-        raise UnreadableMotion(
+        raise UnreadableFile(
             "No such take", f"there is no take {quote_excerpt(take)}", field="take", hint=f"the file has {_list(names)}"
         )
     return names.index(take)
