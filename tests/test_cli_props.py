@@ -51,7 +51,11 @@ def test_props_are_brought_listed_and_removed(server: str, session: str) -> None
 @pytest.mark.parametrize(
     ("arguments", "code", "message"),
     [
-        (["{session}", "sword"], 1, "'umbrella'"),
+        (["{session}", "sword"], 1, "there is no kind 'sword': it is fan, umbrella, ball, branch, or the id"),
+        (["{session}", "sword.glb"], 2, "there is no file sword.glb"),
+        (["sword.glb"], 2, "give a session before it"),
+        (["{session}", "a" * 20], 1, "there is no stored prop"),
+        (["--delete", "a" * 20], 1, "No such prop"),
         (["{session}", *["fan"] * 9], 2, "at most 8 props"),
         (["{session}", "--remove", "8"], 1, "props"),
         (["{server}/v1/motions/m"], 2, "give a session"),

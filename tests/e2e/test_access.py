@@ -35,6 +35,9 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("GET", "/v1/motions/{motion}/thumbnail"): Role.VIEW,
     ("GET", "/v1/motions/{motion}/description"): Role.VIEW,
     ("GET", "/v1/motions/{motion}/blocks/{rate}/{index}"): Role.VIEW,
+    ("GET", "/v1/props"): Role.VIEW,
+    ("GET", "/v1/props/{prop}"): Role.VIEW,
+    ("GET", "/v1/props/{prop}/model"): Role.VIEW,
     ("GET", "/v1/sessions"): Role.VIEW,
     ("GET", "/v1/sessions/{session}"): Role.VIEW,
     ("GET", "/v1/arms/{proportions}/table"): Role.VIEW,
@@ -60,6 +63,8 @@ ROUTES: dict[tuple[str, str], Role | None] = {
     ("DELETE", "/v1/performers/{performer}"): Role.INGEST,
     ("GET", "/v1/uploads/{upload}"): Role.INGEST,
     ("DELETE", "/v1/motions/{motion}"): Role.INGEST,
+    ("POST", "/v1/props"): Role.INGEST,
+    ("DELETE", "/v1/props/{prop}"): Role.INGEST,
 }
 INPUT = "/v1/performers/{performer}/input"
 WEBSOCKETS: dict[str, Role] = {

@@ -146,15 +146,7 @@ class Client:
 
         Case is ignored; an empty text selects all.
         """
-        items: list[dict[str, Any]] = []
-        params: dict[str, Any] = {"limit": 200}
-        params |= {name: text for name, text in (("search", search), ("tag", tag)) if text}
-        while True:
-            page = await self._request("GET", "/v1/motions", params=params)
-            items += page["items"]
-            if page["next"] is None:
-                return items
-            params["cursor"] = page["next"]
+        return await self._list("/v1/motions", {key: text for key, text in (("search", search), ("tag", tag)) if text})
 
     async def motion(self, motion: str) -> dict[str, Any]:
         """Return one motion."""
@@ -170,15 +162,34 @@ class Client:
 
     async def thumbnail(self, motion: str) -> bytes:
         """Return a small picture of a motion as SVG."""
-        response = await self._http.get(f"/v1/motions/{quote(motion, safe='')}/thumbnail")
-        if not response.is_success:
-            body = self._parse_body(response)
-            raise ServerProblem(response.status_code, body if isinstance(body, dict) else {})
-        return response.content
+        return await self._get_bytes(f"/v1/motions/{quote(motion, safe='')}/thumbnail")
 
     async def delete_motion(self, motion: str) -> None:
         """Delete one motion."""
         await self._request("DELETE", f"/v1/motions/{quote(motion, safe='')}")
+
+    async def add_prop(self, path: Path, *, length: float | None = None, grip: str | None = None) -> dict[str, Any]:
+        """Upload a glTF file (GLB, or JSON with embedded data) as a prop, and wait until sessions can have it.
+
+        `length` is that of its longest side in metres, `grip` where it is held: `origin`, `middle` or `bottom`; by
+        default both are as in the file, and `guessed` says what was taken for granted. The result's `id` is a kind for
+        the `props` of `edit_session`.
+        """
+        fit = {"length": None if length is None else str(length), "grip": grip}
+        query = {name: value for name, value in fit.items() if value is not None}
+        return await self._upload_file(path, "/v1/props", None, None, query)
+
+    async def props(self) -> list[dict[str, Any]]:
+        """Return all stored props, newest first."""
+        return await self._list("/v1/props")
+
+    async def prop_model(self, prop: str) -> bytes:
+        """Return the model of a stored prop, as a GLB file."""
+        return await self._get_bytes(f"/v1/props/{quote(prop, safe='')}/model")
+
+    async def delete_prop(self, prop: str) -> None:
+        """Delete one stored prop: sessions and recordings no longer show it."""
+        await self._request("DELETE", f"/v1/props/{quote(prop, safe='')}")
 
     async def open_session(self, motion: str, *, playing: bool = True, loop: bool = True) -> dict[str, Any]:
         """Open a session over a motion."""
@@ -194,7 +205,7 @@ class Client:
         return items[0]["id"] if items else None
 
     async def edit_session(self, session: str, **edit: Any) -> dict[str, Any]:
-        """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`."""
+        """Edit a session: any of `playing`, `position` (microseconds), `loop`, `motion`, `crowd`, `props`."""
         return await self._request("PATCH", f"/v1/sessions/{quote(session, safe='')}", json=edit)
 
     def perform(
@@ -318,6 +329,24 @@ class Client:
                 if progress["stage"] != "receiving":
                     done = progress.get("take", 1) - 1 + progress["share"]
                     on_stage(progress["stage"], done / progress.get("takes", 1))
+
+    async def _list(self, path: str, query: Mapping[str, str] = MappingProxyType({})) -> list[dict[str, Any]]:
+        """Return the items of all pages of a list."""
+        items: list[dict[str, Any]] = []
+        params: dict[str, Any] = {"limit": 200, **query}
+        while True:
+            page = await self._request("GET", path, params=params)
+            items += page["items"]
+            if page["next"] is None:
+                return items
+            params["cursor"] = page["next"]
+
+    async def _get_bytes(self, path: str) -> bytes:
+        response = await self._http.get(path)
+        if not response.is_success:
+            body = self._parse_body(response)
+            raise ServerProblem(response.status_code, body if isinstance(body, dict) else {})
+        return response.content
 
     async def _request(self, method: str, path: str, **options: Any) -> dict[str, Any]:
         response = await self._http.request(method, path, **options)

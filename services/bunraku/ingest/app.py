@@ -1,4 +1,4 @@
-"""Ingest service: creates motions from uploads and sessions; lists, describes and removes motions."""
+"""Ingest service: creates motions from uploads and sessions, and props; lists, describes and removes them."""
 
 from __future__ import annotations
 
@@ -31,12 +31,14 @@ from bunraku.ingest.performance import PerformanceOperation
 from bunraku.ingest.performers import PerformersOperation, PerformersRequest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
+from bunraku.ingest.prop import PropOperation
+from bunraku.ingest.prop_routes import add_prop_routes
 from bunraku.ingest.recording import RecordingOperation
 from bunraku.ingest.reencoding import ReencodingOperation
 from bunraku.ingest.scene import SceneOperation
 from bunraku.ingest.takes import TakesOperation, create_takes_job
 from bunraku.ingest.thumbnail import CONTENT_SECURITY_POLICY, Thumbnails
-from bunraku.ingest.upload import UploadReceiver
+from bunraku.ingest.upload import UPLOAD_NAME_PATTERN, UploadReceiver
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.recording_request import RECORDING_SUBJECT
 from bunraku.runtime.context import ServiceContext
@@ -44,9 +46,6 @@ from bunraku.runtime.display_text import MAX_NAME_CHARACTERS
 from bunraku.runtime.problem import ProblemError
 from bunraku.storage.record import CatalogueEntry, InvalidCursor, MotionFilter
 from bunraku.storage.removal import remove_motion
-
-UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
-"""Pattern of an upload's name, which its client chooses at random."""
 
 MAX_TAKE_CHARACTERS = 200
 """Length of the name of a take: as of a name in a motion file."""
@@ -76,6 +75,7 @@ def create_app(context: ServiceContext) -> FastAPI:
     }
     job_queue = JobQueue(context, worker_slots, handlers)
     uploads = UploadReceiver(context, job_queue)
+    props = PropOperation(context, worker_slots)
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -96,6 +96,7 @@ def create_app(context: ServiceContext) -> FastAPI:
 
     app = FastAPI(title="Bunraku ingest", lifespan=lifespan, openapi_url=None)
     problem_details.install_problem_handlers(app)
+    add_prop_routes(app, context, props, uploads)
 
     @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)

@@ -29,6 +29,7 @@ class JobKind(StrEnum):
     PERFORMANCE = "perform"
     EDIT = "edit"
     REENCODING = "reencode"
+    PROP = "shape"
 
 
 worker_process.preload_modules(
@@ -40,6 +41,7 @@ worker_process.preload_modules(
     "bunraku.ingest.jobs.performance",
     "bunraku.ingest.jobs.edit",
     "bunraku.ingest.jobs.reencoding",
+    "bunraku.ingest.jobs.prop",
 )
 
 
@@ -110,6 +112,13 @@ _FAILURE_TEXTS: dict[JobKind, _FailureTexts] = {
         "encoding this motion again crashed",
         "please report it",
     ),
+    JobKind.PROP: _FailureTexts(
+        "Too large a prop",
+        "simplify it, and reduce its images, before the export",
+        "Unreadable prop",
+        "the reader crashed on this file",
+        "please report it with the file",
+    ),
 }
 
 
@@ -175,6 +184,7 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
     from bunraku.ingest.jobs.motion import encode_file
     from bunraku.ingest.jobs.performance import encode_performance
     from bunraku.ingest.jobs.performers import combine_performers
+    from bunraku.ingest.jobs.prop import make_prop
     from bunraku.ingest.jobs.recording import encode_recording
     from bunraku.ingest.jobs.reencoding import reencode_motion
     from bunraku.ingest.jobs.scene import add_scene_of_body
@@ -188,5 +198,6 @@ def _call_job(kind: JobKind, *arguments: Any) -> JobResult | JobRejection:
         JobKind.PERFORMANCE: encode_performance,
         JobKind.EDIT: edit_motion,
         JobKind.REENCODING: reencode_motion,
+        JobKind.PROP: make_prop,
     }
     return functions[kind](*arguments)

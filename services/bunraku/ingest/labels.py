@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 from bunraku.http.access_control import Access, Role
 from bunraku.runtime.display_text import MAX_NAME_CHARACTERS, clean_text
 from bunraku.runtime.problem import ProblemError
-from bunraku.storage.record import CatalogueEntry
+from bunraku.storage.record import CatalogueEntry, StoredProp
 from bunraku.storage.search_text import fold_text
 
 MAX_TAGS = 16
@@ -74,8 +74,8 @@ class Labels(BaseModel):
         return {**description, **self.model_dump(exclude_unset=True)}
 
 
-def require_ownership(access: Access, entry: CatalogueEntry, change: str) -> None:
-    """Raise `ProblemError` (403) unless a client may change a motion: it stored the motion, or has the role admin."""
+def require_ownership(access: Access, entry: CatalogueEntry | StoredProp, change: str) -> None:
+    """Raise `ProblemError` (403) unless a client may change an entry: it stored the entry, or has the role admin."""
     if access.role < Role.ADMIN and entry.subject != access.subject:
         detail = f"{entry.id} was stored by another subject; {change} it needs the role admin"
         raise ProblemError(403, "Not allowed", detail, needed="admin")

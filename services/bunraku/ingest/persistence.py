@@ -27,7 +27,7 @@ async def check_quota(context: ServiceContext, subject: str) -> None:
     try:
         await context.catalogue.check_quota(subject, quota)
     except QuotaExceeded as error:
-        raise _quota_problem(error) from None
+        raise quota_problem(error) from None
 
 
 async def store_motion(
@@ -54,7 +54,7 @@ async def store_motion(
     except QuotaExceeded as error:
         if await context.catalogue.get_motion(motion_id) is None:
             await context.motion_store.remove(motion_id)
-        raise _quota_problem(error) from None
+        raise quota_problem(error) from None
     if is_new and (await context.motion_store.object_sizes([motion_id]))[0] is None:
         # a removal of the same motion at the same time has taken the object, and then the row that was there
         await context.motion_store.put(motion_id, result.packed)
@@ -82,5 +82,7 @@ async def replace_motion(
     return entry
 
 
-def _quota_problem(error: QuotaExceeded) -> ProblemError:
-    return ProblemError(403, "Quota used up", str(error), hint="remove motions, or ask the operator for a higher quota")
+def quota_problem(error: QuotaExceeded, things: str = "motions") -> ProblemError:
+    """Return the problem (403) of a quota of `things`."""
+    hint = f"remove {things}, or ask the operator for a higher quota"
+    return ProblemError(403, "Quota used up", str(error), hint=hint)

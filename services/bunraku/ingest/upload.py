@@ -5,8 +5,9 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import Awaitable, Callable, Coroutine
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from starlette.requests import ClientDisconnect, Request
 
@@ -22,6 +23,8 @@ from bunraku.runtime.insufficient_storage import translate_disk_full
 from bunraku.runtime.problem import ProblemError
 from bunraku.runtime.temporary_folder import temporary_folder
 
+UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
+"""Pattern of an upload's name, which its client chooses at random."""
 MAX_UPLOADS = 64
 """Uploads that are received, wait for a worker slot or are processed at the same time; further ones get 503."""
 MAX_UPLOADS_PER_HOLDER = 8
@@ -36,6 +39,15 @@ SourceWriter = Callable[[Path, UploadProgress], Awaitable[UploadJob]]
 """Function that writes the file of a job and describes the job."""
 
 
+class UploadRules(NamedTuple):
+    """What files of one kind may be uploaded."""
+
+    max_bytes: int
+    too_large_hint: str
+    check_quota: Callable[[str], Awaitable[None]]
+    """Function that raises `ProblemError` (403) if a subject cannot store one more."""
+
+
 class UploadReceiver:
     """Uploads in progress on one replica.
 
@@ -47,6 +59,9 @@ class UploadReceiver:
         self._job_queue = job_queue
         self._limit = AdmissionLimit("uploads", MAX_UPLOADS, MAX_UPLOADS_PER_HOLDER)
         self._progress: dict[tuple[str, str], UploadProgress] = {}
+        self._motion_rules = UploadRules(
+            context.settings.upload_bytes, "cut it into shorter clips", partial(check_quota, context)
+        )
 
     @property
     def active_count(self) -> int:
@@ -58,18 +73,25 @@ class UploadReceiver:
         return self._progress.get((subject, upload))
 
     async def receive(
-        self, request: Request, upload: str | None, create_job: JobFactory, run_job: JobRunner[Outcome]
+        self,
+        request: Request,
+        upload: str | None,
+        create_job: JobFactory,
+        run_job: JobRunner[Outcome],
+        rules: UploadRules | None = None,
     ) -> Outcome:
         """Receive the file in the request's body, run its job and return what it stored.
 
-        Meanwhile `get_progress` reports on it by the name `upload`, to the same subject only. Raise `ProblemError`, or
-        `ClientDisconnect` if the client disconnects: the job is then cancelled and discarded.
+        Meanwhile `get_progress` reports on it by the name `upload`, to the same subject only. Without `rules`, those of
+        motions apply. Raise `ProblemError`, or `ClientDisconnect` if the client disconnects: the job is then cancelled
+        and discarded.
         """
+        rules = rules or self._motion_rules
 
         async def write_source(path: Path, progress: UploadProgress) -> UploadJob:
-            return create_job(await self._write_body(request, path, progress))
+            return create_job(await self._write_body(request, path, progress, rules))
 
-        return await self._process(request, upload, write_source, run_job)
+        return await self._process(request, upload, write_source, run_job, rules)
 
     async def run(
         self, request: Request, upload: str | None, job: UploadJob, source: bytes, run_job: JobRunner[Outcome]
@@ -80,13 +102,18 @@ class UploadReceiver:
             await asyncio.to_thread(path.write_bytes, source)
             return job
 
-        return await self._process(request, upload, write_source, run_job)
+        return await self._process(request, upload, write_source, run_job, self._motion_rules)
 
     async def _process(
-        self, request: Request, upload: str | None, write_source: SourceWriter, run_job: JobRunner[Outcome]
+        self,
+        request: Request,
+        upload: str | None,
+        write_source: SourceWriter,
+        run_job: JobRunner[Outcome],
+        rules: UploadRules,
     ) -> Outcome:
         subject = access_of(request).subject
-        await check_quota(self._context, subject)
+        await rules.check_quota(subject)
         with self._limit.admit(holder_of(request)):
             # unnamed uploads get a name that no client can request
             key = (subject, upload or f"/{secrets.token_hex()}")
@@ -109,15 +136,15 @@ class UploadReceiver:
             await self._job_queue.discard_job(job.id)
             raise
 
-    async def _write_body(self, request: Request, path: Path, progress: UploadProgress) -> bytes:
+    async def _write_body(self, request: Request, path: Path, progress: UploadProgress, rules: UploadRules) -> bytes:
         """Write the body to `path` and return its SHA-256 digest."""
-        limit = self._context.settings.upload_bytes
+        limit = rules.max_bytes
         content_length = int(request.headers.get("content-length") or 0)
 
         def check_size(size: int) -> None:
             if size > limit:
                 raise ProblemError(
-                    413, "Too large", f"a file may have {limit} bytes", limit=limit, hint="cut it into shorter clips"
+                    413, "Too large", f"a file may have {limit} bytes", limit=limit, hint=rules.too_large_hint
                 )
 
         def on_received(size: int) -> None:

@@ -18,7 +18,7 @@ from bunraku.http.origin import OPAQUE_ORIGIN, parse_origins
 from bunraku.messaging.nats_address import parse_servers
 from bunraku.runtime import metrics
 from bunraku.storage.catalogue import Catalogue
-from bunraku.storage.record import Quota
+from bunraku.storage.record import PropQuota, Quota
 
 MEMORY_BUS = "memory:"
 """URL of the bus within one process."""
@@ -75,7 +75,10 @@ class Settings(BaseSettings):
     """Maximum number of motions of all subjects; 0: unlimited."""
     total_bytes: int = 0
     """Maximum bytes of motions of all subjects; 0: unlimited."""
-
+    quota_props: int = 100
+    """Maximum number of props of one subject; 0: unlimited. Effective with a secret."""
+    total_props: int = 1_000
+    """Maximum number of props of all subjects; 0: unlimited."""
     quota_links: int = 200
     """Maximum number of links of one subject that have not expired; 0: unlimited."""
 
@@ -155,6 +158,10 @@ class Settings(BaseSettings):
         """Return the limits on stored motions; those per subject apply only with a secret, as subjects need tokens."""
         per_subject = (self.quota_motions, self.quota_bytes) if self.secret.get_secret_value() else (0, 0)
         return Quota(*per_subject, self.total_motions, self.total_bytes)
+
+    def prop_quota(self) -> PropQuota:
+        """Return the limits on stored props; those per subject apply only with a secret, as subjects need tokens."""
+        return PropQuota(self.quota_props if self.secret.get_secret_value() else 0, self.total_props)
 
     def session_quota(self) -> int:
         """Return the limit on open sessions of one subject, 0 without a secret, as subjects need tokens."""

@@ -85,9 +85,13 @@ def create_app(context: ServiceContext) -> FastAPI:
     @app.patch("/v1/sessions/{session}", tags=["sessions"])
     @requires(Role.CONTROL)
     async def edit(session: str, edit: SessionEdit, request: Request) -> dict[str, Any]:
-        """Play, pause, seek, loop, or change the motion, for everyone."""
+        """Play, pause, seek, loop, or change the motion, the open limbs and the props, for everyone."""
         if edit.motion is not None:
             _require_unbound(access_of(request))
+        for key, prop in edit.stored_props.items():
+            if await context.catalogue.get_prop(prop) is None:
+                detail, hint = f"there is no stored prop {prop!r}", "GET /v1/props lists all"
+                raise ProblemError(422, "No such prop", detail, field=f"props.{key}", hint=hint)
         return await sessions.stage_proxy(session).edit(edit)
 
     @app.delete("/v1/sessions/{session}", status_code=204, tags=["sessions"])

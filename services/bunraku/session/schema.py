@@ -17,7 +17,7 @@ from bunraku.motion.rotation import Array
 from bunraku.motion.skeleton import JOINT_COUNT, JOINTS, TIP_JOINTS, Figure
 from bunraku.runtime.problem import ProblemError
 from bunraku.wire.limbs import LIMBS, MAX_LIMBS
-from bunraku.wire.prop import MAX_PROPS, PropKind
+from bunraku.wire.prop import MAX_PROPS, STORED_PROP_PATTERN, PropKind, is_stored_prop
 
 MAX_BONE_M = 3.0
 """Longest part of an offset or tip along one axis."""
@@ -40,6 +40,12 @@ def _check_prop(key: str) -> str:
     return key
 
 
+def _check_kind(kind: str) -> str:
+    if kind not in tuple(PropKind) and not is_stored_prop(kind):
+        raise ValueError(f"there is no kind {kind[:40]!r}: it is {', '.join(PropKind)}, or the id of a stored prop")
+    return kind
+
+
 LimbKey = Annotated[
     str,
     AfterValidator(_check_limb),
@@ -48,6 +54,12 @@ LimbKey = Annotated[
 """Name of a limb of the first performer, or number of a limb in decimal."""
 PropKey = Annotated[str, AfterValidator(_check_prop), Field(json_schema_extra={"pattern": rf"^[0-{MAX_PROPS - 1}]$"})]
 """Number of a prop in decimal."""
+Kind = Annotated[
+    str,
+    AfterValidator(_check_kind),
+    Field(json_schema_extra={"pattern": rf"^({'|'.join(PropKind)}|{STORED_PROP_PATTERN})$"}),
+]
+"""Kind of a prop: a built-in one, or the id of a stored prop."""
 
 
 class NewSession(BaseModel):
@@ -76,8 +88,11 @@ class SessionEdit(BaseModel):
         ),
     ] = {}
     props: Annotated[
-        dict[PropKey, PropKind | None],
-        Field(max_length=MAX_PROPS, description="kind of each prop to bring on the stage, by number; null removes it"),
+        dict[PropKey, Kind | None],
+        Field(
+            max_length=MAX_PROPS,
+            description="kind of each prop to bring on the stage, or id of a stored one, by number; null removes it",
+        ),
     ] = {}
 
     @field_validator("crowd")
@@ -94,9 +109,14 @@ class SessionEdit(BaseModel):
         changed = {**before, **{limb: policy and policy.value for limb, policy in edits.items()}}
         return {limb: policy for limb, policy in changed.items() if policy is not None}
 
+    @property
+    def stored_props(self) -> dict[str, str]:
+        """Ids of the stored props that this edit brings, by key."""
+        return {key: kind for key, kind in self.props.items() if kind is not None and is_stored_prop(kind)}
+
     def prop_kinds(self, before: Mapping[int, str]) -> dict[int, str]:
         """Return the kinds of the props after this edit, by number."""
-        changed = {**before, **{_PROP_NUMBERS[key]: kind and kind.value for key, kind in self.props.items()}}
+        changed = {**before, **{_PROP_NUMBERS[key]: kind for key, kind in self.props.items()}}
         return {number: kind for number, kind in changed.items() if kind is not None}
 
 

@@ -1,4 +1,4 @@
-"""Catalogue of motions, viewer links and pending jobs, opened on first use."""
+"""Catalogue of motions, props, viewer links and pending jobs, opened on first use."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 from bunraku.storage.postgres_url import split_tls_options
-from bunraku.storage.record import CatalogueEntry, Job, JobHold, MotionFilter, Quota, Share, ShareScope
+from bunraku.storage.record import (
+    CatalogueEntry,
+    Job,
+    JobHold,
+    MotionFilter,
+    PropQuota,
+    Quota,
+    Share,
+    ShareScope,
+    StoredProp,
+)
 
 if TYPE_CHECKING:
     from bunraku.storage.catalogue_sql import DescriptionEdit, MotionKey, SqlCatalogue
@@ -140,6 +150,30 @@ class Catalogue:
     async def remove_job(self, job_id: str) -> None:
         """Remove a job that is complete or given up."""
         await (await self.open()).jobs.remove(job_id)
+
+    async def add_prop(self, prop: StoredProp, model: bytes, quota: PropQuota) -> bool:
+        """Add a prop and its model, and return whether it is new; raise `QuotaExceeded`, with nothing added."""
+        return await (await self.open()).props.add(prop, model, quota)
+
+    async def check_prop_quota(self, subject: str, quota: PropQuota) -> None:
+        """Raise `QuotaExceeded` if `subject` cannot add one more prop."""
+        await (await self.open()).props.check_quota(subject, quota)
+
+    async def get_prop(self, prop_id: str) -> StoredProp | None:
+        """Return a prop, None if it does not exist."""
+        return await (await self.open()).props.get(prop_id)
+
+    async def get_prop_model(self, prop_id: str) -> bytes | None:
+        """Return the model of a prop, None if it does not exist."""
+        return await (await self.open()).props.get_model(prop_id)
+
+    async def list_props(self, limit: int, cursor: str | None = None) -> tuple[list[StoredProp], str | None]:
+        """Return at most `limit` props, newest first, and the next page's cursor; raise `InvalidCursor`."""
+        return await (await self.open()).props.list(limit, cursor)
+
+    async def remove_prop(self, prop_id: str) -> bool:
+        """Remove a prop and return whether it existed."""
+        return await (await self.open()).props.remove(prop_id)
 
     async def add_share(self, share: Share, max_per_subject: int = 0) -> None:
         """Add a viewer link and remove those that expired before it was created.

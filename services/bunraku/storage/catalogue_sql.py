@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import base64
-import binascii
 import json
 import sqlite3
 from collections.abc import Callable, Coroutine
@@ -20,10 +18,12 @@ from sqlalchemy.ext.asyncio import AsyncConnection, AsyncEngine
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendTimeout, BackendUnavailable
 from bunraku.runtime.insufficient_storage import insufficient_storage
 from bunraku.runtime.problem import ProblemError
+from bunraku.storage.cursor import parse_cursor, write_cursor
 from bunraku.storage.engine import create_engine
 from bunraku.storage.job_sql import SqlJobTable
 from bunraku.storage.migration import HEAD_REVISION, migrate, read_schema_version
-from bunraku.storage.record import CatalogueEntry, InvalidCursor, MotionFilter, Quota, QuotaExceeded, is_motion_id
+from bunraku.storage.prop_sql import SqlPropTable
+from bunraku.storage.record import CatalogueEntry, MotionFilter, Quota, QuotaExceeded, is_motion_id
 from bunraku.storage.search_text import fold_tag, fold_text, search_columns
 from bunraku.storage.share_sql import SqlShareTable
 from bunraku.storage.space_reserve import SpaceReserve
@@ -58,7 +58,7 @@ class MotionKey(NamedTuple):
 
 
 class SqlCatalogue:
-    """Tables of motions, jobs and viewer links.
+    """Tables of motions, jobs, viewer links and props.
 
     Methods raise `BackendUnavailable` while the database is unavailable, on PostgreSQL also if it does not respond
     within `BACKEND_TIMEOUT_S`, and work again when it recovers. If the disk of the database is full, methods that
@@ -88,6 +88,7 @@ class SqlCatalogue:
                 self.reserve = SpaceReserve(database.with_name(database.name + RESERVE_SUFFIX))
         self.jobs = SqlJobTable(self._engine, self._run_query, self._run_removal)
         self.shares = SqlShareTable(self._engine, self._run_query, self._run_removal)
+        self.props = SqlPropTable(self._engine, self._run_query, self._run_removal)
 
     @classmethod
     async def open(cls, url: str) -> SqlCatalogue:
@@ -132,7 +133,7 @@ class SqlCatalogue:
 
         A cursor is a position in the list of all motions: it stays valid whatever is added, removed or renamed.
         """
-        after = _parse_cursor(cursor) if cursor is not None else None
+        after = parse_cursor(cursor) if cursor is not None else None
         if condition != ALL_MOTIONS:
             while await self._run_query(self._fill_search_columns()):
                 pass
@@ -245,7 +246,7 @@ class SqlCatalogue:
         if len(entries) <= limit:
             return entries, None
         last = entries[limit - 1]
-        return entries[:limit], base64.urlsafe_b64encode(f"{last.created}:{last.id}".encode()).decode()
+        return entries[:limit], write_cursor(last.created, last.id)
 
     async def _delete_motion(self, motion_id: str) -> bool:
         async with self._engine.begin() as connection:
@@ -343,13 +344,3 @@ async def _enforce_quota(connection: AsyncConnection, subject: str, quota: Quota
             raise QuotaExceeded(f"{scope} at most {max_motions} motions")
         if max_bytes and size + additional > max_bytes:
             raise QuotaExceeded(f"{scope} at most {max_bytes} bytes of motions")
-
-
-def _parse_cursor(cursor: str) -> tuple[int, str]:
-    try:
-        created, motion = base64.urlsafe_b64decode(cursor.encode()).decode().split(":", 1)
-        if not is_motion_id(motion):
-            raise ValueError(motion)
-        return min(max(int(created), 0), (1 << 63) - 1), motion
-    except (ValueError, binascii.Error):
-        raise InvalidCursor("the cursor is invalid; omit it to get the first page") from None

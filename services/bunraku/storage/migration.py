@@ -17,7 +17,7 @@ from sqlalchemy.ext.asyncio import AsyncConnection
 from bunraku.runtime.availability import BACKEND_TIMEOUT_S, BackendUnavailable
 from bunraku.storage.engine import create_engine
 
-HEAD_REVISION = "0004"
+HEAD_REVISION = "0005"
 """Schema version of this code."""
 UNVERSIONED_REVISION = "0001"
 """Schema version of a catalogue that has the table of motions and no version."""

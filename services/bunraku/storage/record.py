@@ -12,7 +12,7 @@ _MOTION_ID_PATTERN = re.compile(r"[A-Za-z0-9]{1,64}")
 
 
 def is_motion_id(text: str) -> bool:
-    """Return whether a text of a client may be the id of a motion. Databases and file systems reject others."""
+    """Return whether a text of a client may be the id of a motion or prop. Databases and file systems reject others."""
     return _MOTION_ID_PATTERN.fullmatch(text) is not None
 
 
@@ -64,6 +64,27 @@ class Quota:
     max_bytes: int = 0
     max_total_motions: int = 0
     max_total_bytes: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class StoredProp:
+    """A prop of the library, without its model."""
+
+    id: str
+    created: int
+    """Microseconds since 1970."""
+    description: dict[str, Any]
+    """Description of the prop in the API's JSON."""
+    subject: str = ""
+    """Subject of the token with which it was stored."""
+
+
+@dataclass(frozen=True, slots=True)
+class PropQuota:
+    """Limits on stored props, per subject and in total; 0 is unlimited."""
+
+    max_props: int = 0
+    max_total_props: int = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine
 from typing import Any, Protocol, TypeVar
 
-from sqlalchemy import BigInteger, Column, Integer, MetaData, String, Table, Text
+from sqlalchemy import BigInteger, Column, Integer, LargeBinary, MetaData, String, Table, Text
 
 METADATA = MetaData()
 MOTIONS = Table(
@@ -38,6 +38,15 @@ SHARES = Table(
     Column("subject", String(64), nullable=False),
     Column("session", String(64), nullable=True),
     Column("motion", String(64), nullable=True),
+)
+PROPS = Table(
+    "props",
+    METADATA,
+    Column("id", String(32), primary_key=True),
+    Column("created", BigInteger, nullable=False, index=True),
+    Column("subject", String(64), nullable=False, index=True),
+    Column("description", Text, nullable=False),
+    Column("model", LargeBinary, nullable=False),
 )
 
 Result = TypeVar("Result")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from typing import Any, NamedTuple, Self
 
@@ -18,6 +19,15 @@ class PropKind(StrEnum):
     UMBRELLA = "umbrella"
     BALL = "ball"
     BRANCH = "branch"
+
+
+STORED_PROP_PATTERN = r"[a-z2-7]{20}"
+"""Ids of stored props, which are kinds too (proto/http.md, 7.11)."""
+
+
+def is_stored_prop(kind: str) -> bool:
+    """Return whether a kind is the id of a stored prop."""
+    return re.fullmatch(STORED_PROP_PATTERN, kind) is not None
 
 
 class PropState(NamedTuple):

@@ -20,7 +20,7 @@ from bunraku.motion.readers.gltf_face import (
     read_weights,
     sample_expressions,
 )
-from bunraku.motion.readers.gltf_file import GltfFile, broken, check_index, check_objects, parse_gltf_file
+from bunraku.motion.readers.gltf_file import GltfFile, broken, check_index, check_objects, parse_gltf_file, read_numbers
 from bunraku.motion.readers.node_motion import (
     Interpolation,
     Node,
@@ -160,7 +160,7 @@ def _read_nodes(file: GltfFile, moved: set[int]) -> tuple[list[Node], dict[int, 
 
     Also returns the position in this list of each node of the file.
     """
-    parents = _find_parents(file)
+    parents = file.find_parents()
     bones = _humanoid_bones(file)
     wanted = {*moved, *bones}
     for number, skin in enumerate(file.items("skins")):
@@ -185,33 +185,6 @@ def _read_nodes(file: GltfFile, moved: set[int]) -> tuple[list[Node], dict[int, 
         name = bones.get(index) or str(item.get("name") or f"node {index}")
         nodes.append(Node(name, kept[parents[index]], *_rest_transform(item, index)))
     return nodes, kept
-
-
-def _find_parents(file: GltfFile) -> list[int]:
-    """Return the parent of each node, -1 for roots; raise `UnreadableFile` unless they are a tree."""
-    items = file.items("nodes")
-    parents = [-1] * len(items)
-    for index, item in enumerate(items):
-        children = item.get("children", [])
-        if not isinstance(children, list):
-            raise broken(f"nodes[{index}]", "children is no list")
-        for child in children:
-            number = file.check_index("nodes", child)
-            if parents[number] >= 0:
-                raise broken(f"nodes[{number}]", "it has two parents")
-            parents[number] = index
-    state = [0] * len(items)
-    for index in range(len(items)):
-        path = []
-        while index >= 0 and state[index] == 0:
-            state[index] = 1
-            path.append(index)
-            index = parents[index]
-        if index >= 0 and state[index] == 1:
-            raise broken(f"nodes[{index}]", "it lies inside itself")
-        for passed in path:
-            state[passed] = 2
-    return parents
 
 
 def _order_nodes(wanted: set[int], parents: list[int]) -> list[int]:
@@ -247,25 +220,18 @@ def _rest_transform(item: dict[str, Any], index: int) -> tuple[Array, Array, Arr
     """Return translation (3,), rotation (4,) and scale (3,) of a node."""
     where = f"nodes[{index}]"
     if "matrix" in item:
-        matrix = _read_numbers(item["matrix"], 16, where).reshape(4, 4).T
+        matrix = read_numbers(item["matrix"], 16, where, "transform").reshape(4, 4).T
         scale = np.linalg.norm(matrix[:3, :3], axis=0)
         if not (scale > 0.0).all():
             raise broken(where, "its matrix has no inverse")
         if np.linalg.det(matrix[:3, :3]) < 0.0:
             scale[2] = -scale[2]
         return matrix[:3, 3], rotation.from_matrix(matrix[:3, :3] / scale), scale
-    turn = _read_numbers(item.get("rotation", [0.0, 0.0, 0.0, 1.0]), 4, where)[[3, 0, 1, 2]]
+    turn = read_numbers(item.get("rotation", [0.0, 0.0, 0.0, 1.0]), 4, where, "transform")[[3, 0, 1, 2]]
     if not np.linalg.norm(turn) > 0.0:
         raise broken(where, "its rotation is zero")
     return (
-        _read_numbers(item.get("translation", [0.0] * 3), 3, where),
+        read_numbers(item.get("translation", [0.0] * 3), 3, where, "transform"),
         rotation.normalise(turn),
-        _read_numbers(item.get("scale", [1.0] * 3), 3, where),
+        read_numbers(item.get("scale", [1.0] * 3), 3, where, "transform"),
     )
-
-
-def _read_numbers(value: object, count: int, where: str) -> Array:
-    numbers = value if isinstance(value, list) and len(value) == count else []
-    if not numbers or not all(isinstance(each, int | float) and abs(each) < 1e30 for each in numbers):
-        raise broken(where, f"its transform is not {count} numbers")
-    return np.array(numbers, dtype=np.float64)

@@ -80,6 +80,35 @@ class GltfFile:
             return np.maximum(scaled, -1.0)
         return values.astype(np.float64)
 
+    def read_image(self, index: object) -> bytes:
+        """Return the bytes of an image, encoded as in the file."""
+        image = self.item("images", index)
+        where = f"images[{index}]"
+        if "bufferView" not in image:
+            return _decode_uri(image.get("uri"), where)
+        view = self.item("bufferViews", image["bufferView"])
+        buffer = self._read_buffer(view.get("buffer", 0))
+        start, length = _whole(view, "byteOffset", 0, where), _whole(view, "byteLength", 0, where)
+        if start + length > len(buffer):
+            raise broken(where, f"its {length} bytes reach beyond its data")
+        return buffer[start : start + length]
+
+    def find_parents(self) -> list[int]:
+        """Return the parent of each node, -1 for roots; raise `UnreadableFile` unless they are a tree."""
+        items = self.items("nodes")
+        parents = [-1] * len(items)
+        for index, item in enumerate(items):
+            children = item.get("children", [])
+            if not isinstance(children, list):
+                raise broken(f"nodes[{index}]", "children is no list")
+            for child in children:
+                number = self.check_index("nodes", child)
+                if parents[number] >= 0:
+                    raise broken(f"nodes[{number}]", "it has two parents")
+                parents[number] = index
+        _check_tree(parents)
+        return parents
+
     def _replace_sparse(self, sparse: object, values: np.ndarray[Any, Any], where: str) -> np.ndarray[Any, Any]:
         """Return `values` with those of a sparse accessor in their places (glTF 2.0, 3.6.2.3)."""
         if not isinstance(sparse, dict):
@@ -135,20 +164,9 @@ class GltfFile:
         uri = self.item("buffers", number).get("uri")
         if uri is None:
             return self.binary
-        if (known := self._buffers.get(number)) is not None:
-            return known
-        if not isinstance(uri, str) or not uri.startswith(_DATA_URI):
-            raise UnreadableFile(
-                "Not one file",
-                f"its data is in another file, {quote_excerpt(str(uri))}",
-                field=f"buffers[{index}]",
-                hint="export it as GLB, or with embedded buffers",
-            )
-        try:
-            decoded = self._buffers[number] = base64.b64decode(uri.partition(",")[2], validate=True)
-        except binascii.Error as error:
-            raise broken(f"buffers[{index}]", "its data is not Base64") from error
-        return decoded
+        if number not in self._buffers:
+            self._buffers[number] = _decode_uri(uri, f"buffers[{index}]")
+        return self._buffers[number]
 
 
 def parse_gltf_file(data: bytes) -> GltfFile:
@@ -199,6 +217,14 @@ def _split_chunks(data: bytes) -> tuple[bytes, bytes]:
     return chunks[b"JSON"], chunks.get(b"BIN\0", b"")
 
 
+def read_numbers(value: object, count: int, where: str, name: str) -> Array:
+    """Return `value`, called `name`, if it is a list of `count` numbers."""
+    numbers = value if isinstance(value, list) and len(value) == count else []
+    if not numbers or not all(isinstance(each, int | float) and abs(each) < 1e30 for each in numbers):
+        raise broken(where, f"its {name} is not {count} numbers")
+    return np.array(numbers, dtype=np.float64)
+
+
 def check_objects(value: object, name: str) -> list[dict[str, Any]]:
     """Return `value` if it is a list of objects."""
     if not isinstance(value, list) or not all(isinstance(item, dict) for item in value):
@@ -221,6 +247,36 @@ def _look_up(table: Mapping[Any, _Value], key: object) -> _Value | None:
 def broken(field: str, detail: str) -> UnreadableFile:
     """Return the error of an asset that contradicts the specification."""
     return UnreadableFile("Broken glTF file", detail, field=field, hint=_REEXPORT)
+
+
+def _decode_uri(uri: object, where: str) -> bytes:
+    """Return the data in a data URI (RFC 2397)."""
+    if not isinstance(uri, str) or not uri.startswith(_DATA_URI):
+        raise UnreadableFile(
+            "Not one file",
+            f"its data is in another file, {quote_excerpt(str(uri))}",
+            field=where,
+            hint="export it as GLB, or with embedded buffers",
+        )
+    try:
+        return base64.b64decode(uri.partition(",")[2], validate=True)
+    except binascii.Error as error:
+        raise broken(where, "its data is not Base64") from error
+
+
+def _check_tree(parents: list[int]) -> None:
+    """Raise `UnreadableFile` if a node is its own ancestor."""
+    state = [0] * len(parents)
+    for start in range(len(parents)):
+        index, path = start, []
+        while index >= 0 and state[index] == 0:
+            state[index] = 1
+            path.append(index)
+            index = parents[index]
+        if index >= 0 and state[index] == 1:
+            raise broken(f"nodes[{index}]", "it lies inside itself")
+        for passed in path:
+            state[passed] = 2
 
 
 def _whole(item: dict[str, Any], name: str, default: int, where: str) -> int:
