@@ -36,7 +36,7 @@ class PropModel:
     @property
     def size(self) -> list[float]:
         """Extents along x, y and z, in metres."""
-        return [round(float(extent), 4) for extent in np.ptp(self.positions, axis=0)]
+        return [round(float(extent), 3) for extent in np.ptp(self.positions, axis=0)]
 
 
 def weld_model(model: PropModel) -> PropModel:

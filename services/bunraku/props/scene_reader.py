@@ -50,8 +50,8 @@ def read_surfaces(file: GltfFile, decode_image: ImageDecoder) -> list[Surface]:
 def _check_extensions(file: GltfFile) -> None:
     required = file.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
-        if name not in _SUPPORTED:
-            remedy = _REMEDIES.get(name) if isinstance(name, str) else None
+        if not isinstance(name, str) or name not in _SUPPORTED:
+            remedy = _REMEDIES.get(str(name))
             raise UnreadableFile(
                 "Unsupported extension",
                 f"the file requires {str(name)[:60]}",

@@ -30,8 +30,11 @@ class Texture:
 
     def sample(self, coordinates: Array) -> Array:
         """Return the values (n, 4) at texture coordinates (n, 2)."""
-        height, width = self.pixels.shape[:2]
-        at = coordinates * (width, height) - 0.5
+        size = np.array(self.pixels.shape[1::-1])
+        at = coordinates * size - 0.5
+        # at the border of the image, the other side does not shine through: a corner's colour is seen far from it
+        is_inside = (coordinates >= 0.0) & (coordinates <= 1.0)
+        at = np.where(is_inside, np.clip(at, 0.0, size - 1.0), at)
         if not self.is_smooth:
             return self._pick(np.rint(at))
         below = np.floor(at)
