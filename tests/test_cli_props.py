@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from bunraku.cli import app
 from bunraku.client import Client, Puppeteer
+from tests.props.samples import box_glb
 from tests.servers import make_bvh_clip
 
 RUN = CliRunner()
@@ -68,3 +69,20 @@ def test_refusal_is_printed(server: str, session: str, arguments: list[str], cod
     assert result.exit_code == code
     assert message in " ".join(result.output.split())
     assert "Traceback" not in result.output
+
+
+def test_props_from_files_are_stored_brought_and_deleted(server: str, session: str, tmp_path: Path) -> None:
+    path = tmp_path / "staff.glb"
+    path.write_bytes(box_glb(5.0, 60.0, 5.5, -10.0))
+    brought = run(server, session, str(path), "fan", str(path))
+    assert brought.splitlines() == [
+        "staff: Its 60 units seem to be centimetres: it is 0.6 m long.",
+        "0  staff on the floor",
+        "1  fan on the floor",
+        "2  staff on the floor",
+    ]
+    kind = json.loads(run(server, session, "--json"))["props"][0]["kind"]
+    assert f"{kind}  staff, 0.05 x 0.60 x 0.06 m, 12 triangles" in run(server).splitlines()
+    assert run(server, session, kind, "--remove", "2").splitlines()[2] == "2  staff on the floor"
+    assert kind not in run(server, "--delete", kind)
+    assert f"0  {kind} on the floor" in run(server, session).splitlines()

@@ -71,6 +71,9 @@ APPS: dict[str, list[str]] = {
         "/v1/motions/{motion}/scene",
         "/v1/motions/{motion}/performers",
         "/v1/uploads/{upload}",
+        "/v1/props",
+        "/v1/props/{prop}",
+        "/v1/props/{prop}/model",
     ],
     "ik": ["/v1/arms/{proportions}/table", "/v1/arms/{proportions}/figures/{name}", "/v1/solve"],
     "session": [

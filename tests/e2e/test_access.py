@@ -116,6 +116,7 @@ class GuardedServer:
             "proportions": "393-351-256-560-320-120",
             "name": "circle",
             "upload": "unknown-upload",
+            "prop": "unknown-prop",
             "share": "0" * 18,
             "performer": f"{self.session}-0000000000",
         }

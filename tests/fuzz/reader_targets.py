@@ -1,4 +1,4 @@
-"""Fuzzing targets: the readers of motion files, and invariants of every motion that they return.
+"""Fuzzing targets: the readers of motion files and props, and invariants of what they return.
 
 A target returns True if it accepts a file and False if it rejects it with `UnreadableFile`. Any other exception is a
 failure. The reader of FBX is a compiled library that can end the process: its target is for a separate process.
@@ -12,6 +12,7 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from bunraku.ingest.jobs.image_file import decode_image
 from bunraku.motion import rotation
 from bunraku.motion.analysis import analyse
 from bunraku.motion.errors import UnreadableFile
@@ -24,6 +25,9 @@ from bunraku.motion.readers.bvh import parse_bvh
 from bunraku.motion.readers.gltf import parse_gltf
 from bunraku.motion.readers.motion_file import read_motion
 from bunraku.motion.source_motion import SourceMotion
+from bunraku.props.model_file import write_model
+from bunraku.props.reader import read_prop
+from bunraku.props.scene_reader import MAX_TRIANGLES
 from tests.motion.extended_source import write_source_bvh
 from tests.motion.hand_source import hand_source
 from tests.motion.readers.faces import FaceGlb, build_face_fbx
@@ -31,6 +35,7 @@ from tests.motion.readers.fbx_tree import MAGIC, to_ascii, to_binary
 from tests.motion.readers.fbx_writer import build_fbx, write_fbx
 from tests.motion.readers.sources import pack_glb, unpack_glb, write_acclaim, write_glb, write_zip
 from tests.motion.synthetic_motion import export_bvh, smooth_motion
+from tests.props.samples import box_glb, image_file, picture_glb
 
 MAX_FRAMES = 300
 """Frames whose transforms are computed: sparse keys may stand for many."""
@@ -117,11 +122,31 @@ def fbx(data: bytes) -> bool:
     return _accepts(read_motion, data if data.startswith(MAGIC) else b"; FBX 7.4.0\n" + data)
 
 
-TARGETS: list[Callable[[bytes], bool]] = [bvh, gltf, acclaim, archive]
+def prop(data: bytes) -> bool:
+    """Read a prop, and check that its model fits into a file that clients read."""
+    try:
+        model, guessed = read_prop(data, decode_image)
+    except UnreadableFile:
+        return False
+    count = len(model.positions)
+    assert 0 < count < 1 << 16
+    assert 0 < len(model.triangles) <= MAX_TRIANGLES
+    assert ((model.triangles >= 0) & (model.triangles < count)).all()
+    assert np.isfinite(model.positions).all()
+    assert np.abs(model.normals).max() <= 1.0
+    assert ((model.looks >= 0.0) & (model.looks <= 1.0)).all()
+    assert np.isfinite([model.form.pitch, model.form.height, model.form.palm_offset]).all()
+    assert len(guessed) <= 2
+    write_model(model)
+    return True
+
+
+TARGETS: list[Callable[[bytes], bool]] = [bvh, gltf, acclaim, archive, prop]
 
 DICTIONARY = ["JOINT", "End Site", "CHANNELS", "OFFSET", "MOTION", "Frames:", ":hierarchy", ":bonedata", "dof", "begin"]
 DICTIONARY += ["weights", "targetNames", "VRMC_vrm_animation", "expressions", "preset", "lookAt", "Thumb", "Index"]
 DICTIONARY += ["accessors", "bufferViews", "animations", "children", "sampler", "VEC4", "CUBICSPLINE", "glTF", "JSON"]
+DICTIONARY += ["materials", "pbrMetallicRoughness", "baseColorTexture", "textures", "images", "COLOR_0", "doubleSided"]
 """Words of libFuzzer, for texts."""
 
 
@@ -143,6 +168,8 @@ def load_seeds() -> list[tuple[int, bytes]]:
         (0, write_source_bvh(hand_source(2))),
         (2, asf + SEPARATOR + amc),
         (3, write_zip({"a.bvh": clip})),
+        (4, box_glb()),
+        (4, picture_glb(image_file(np.eye(8, dtype=np.uint8)[..., None].repeat(3, axis=2) * 255), doubleSided=True)),
         (3, write_zip({"03.asf": asf, "03_01.amc": amc})),
         (3, write_zip({"a.glb": glb, "b.txt": b"x"})),
     ]

@@ -28,7 +28,7 @@ def area(surface: Surface) -> float:
 
 def disc(size: int = 64) -> Array:
     y, x = np.mgrid[:size, :size] - size / 2
-    return (np.hypot(x, y) < size / 3).astype(np.float64)
+    return np.asarray(np.hypot(x, y) < size / 3, dtype=np.float64)
 
 
 def test_even_texture_is_not_divided() -> None:

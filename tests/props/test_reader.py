@@ -16,7 +16,7 @@ def test_box_becomes_a_prop_with_its_colour_and_form() -> None:
     # flat faces: each has corners of its own
     assert len(model.positions) == 24
     assert model.looks == pytest.approx(np.tile([0.45, 0.03, 0.014, 1.0, 0.6, 0.0, 0.0], (24, 1)), abs=0.003)
-    assert (model.form.pitch, model.form.palm_offset) == (pytest.approx(np.pi / 2), 0.0)
+    assert [model.form.pitch, model.form.palm_offset] == pytest.approx([np.pi / 2, 0.0])
 
 
 def test_picture_becomes_colours_of_corners() -> None:

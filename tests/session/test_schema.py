@@ -39,6 +39,12 @@ def test_edit_with_fraction_or_unknown_field_is_invalid(values: dict[str, object
         ({"props": {"99": "fan"}}, "props.99", "there is no prop '99': props are 0 to 7"),
         ({"props": {"\uff11": "fan"}}, "props.\uff11", "there is no prop"),
         ({"props": {"01": "fan"}}, "props.01", "there is no prop"),
+        (
+            {"props": {"0": "sword"}},
+            "props.0",
+            "there is no kind 'sword': it is fan, umbrella, ball, branch, or the id",
+        ),
+        ({"props": {"0": "A" * 20}}, "props.0", "there is no kind"),
         ({"crowd": {"77": "vote"}}, "crowd.77", "there is no limb '77': limbs are left_hand"),
         # a digit of another script
         ({"crowd": {"\uff10": "vote"}}, "crowd.\uff10", "there is no limb"),
@@ -66,3 +72,9 @@ def test_new_session_plays_and_loops_by_default() -> None:
     assert (new.playing, new.loop) == (True, True)
     with pytest.raises(ValidationError):
         NewSession.model_validate({"motion": "a" * 65})
+
+
+def test_stored_props_are_told_from_built_in_kinds() -> None:
+    edit = SessionEdit.model_validate({"props": {"0": "fan", "3": "abcdefghij234567abcd", "4": None}})
+    assert edit.stored_props == {"3": "abcdefghij234567abcd"}
+    assert edit.prop_kinds({4: "ball", 5: "branch"}) == {0: "fan", 3: "abcdefghij234567abcd", 5: "branch"}
