@@ -60,10 +60,12 @@ READERS = [
     "bunraku.motion.readers.gltf_file",
     "bunraku.motion.readers.motion_file",
     "bunraku.motion.readers.node_motion",
+    "bunraku.props.material_reader",
+    "bunraku.props.scene_reader",
     "tests.fuzz.reader_targets",
     "zipfile",
 ]
-READER_GROUPS = ("bvh", "gltf", "acclaim", "archive")
+READER_GROUPS = ("bvh", "gltf", "acclaim", "archive", "prop")
 
 
 def main() -> None:

@@ -1,9 +1,11 @@
-"""Props: tracks, blocks, and the props of motion times (`props.json`)."""
+"""Props: tracks, blocks, the props of motion times, and models of stored props (`props.json`)."""
 
 from __future__ import annotations
 
 import struct
 from typing import Any
+
+import numpy as np
 
 from bunraku.codec.extension.props import (
     EncodedProps,
@@ -16,9 +18,13 @@ from bunraku.codec.extension.props import (
     shift_limb,
 )
 from bunraku.codec.timing import Timing
+from bunraku.ingest.jobs.image_file import decode_image
 from bunraku.motion.placement import Placement
 from bunraku.playout.block_store import PropBlockStore
+from bunraku.props.model_file import write_model
+from bunraku.props.reader import read_prop
 from bunraku.wire.prop import PropState
+from tests.props.samples import Asset, box
 from tests.vectors.blocks import to_base64
 
 _FLOOR, _BACK = PropState(None, Placement(0.5, -0.25, 1.5)), PropState(None, Placement(-99.5, 100.0, -3.125))
@@ -82,8 +88,36 @@ def load_track(description: dict[str, Any]) -> PropTrack:
     return parse_prop_track(description)
 
 
+def model_vectors() -> list[dict[str, Any]]:
+    """Return models of props as they are served, with their values."""
+    vectors = []
+    for name, width, bottom in (("staff", 0.05, -0.1), ("crate", 0.5, -0.25)):
+        asset = Asset()
+        factors = {"baseColorFactor": [0.45, 0.03, 0.014, 1.0], "metallicFactor": 0.3, "roughnessFactor": 0.6}
+        material = asset.add_material(pbrMetallicRoughness=factors)
+        mesh = asset.add_mesh(*box(width, 0.61, width * 0.9, bottom), material)
+        asset.add_node(mesh=mesh, rotation=[0.0, 0.6, 0.0, 0.8])
+        model, _ = read_prop(asset.pack(), decode_image)
+        colours = np.rint(model.looks[:, :3] * 65535.0) / 65535.0
+        vectors.append(
+            {
+                "name": name,
+                "model": to_base64(write_model(model)),
+                "pitch": model.form.pitch,
+                "height": model.form.height,
+                "palmOffset": model.form.palm_offset,
+                "positions": model.positions.reshape(-1).tolist(),
+                "normals": model.normals.reshape(-1).tolist(),
+                "colours": colours.reshape(-1).tolist(),
+                "finishes": model.looks[:, 4:].reshape(-1).tolist(),
+                "indices": model.triangles.reshape(-1).tolist(),
+            }
+        )
+    return vectors
+
+
 def make_vectors() -> dict[str, Any]:
-    """Return tracks, their blocks, states at motion times, and invalid blocks and descriptions."""
+    """Return tracks, their blocks, states at motion times, models, and invalid blocks and descriptions."""
     encoded, valid, positions = _encoded(), [], []
     for number, each in enumerate(encoded):
         store = PropBlockStore(each.track)
@@ -119,6 +153,7 @@ def make_vectors() -> dict[str, Any]:
         "tracks": [each.describe() for each in encoded],
         "valid": valid,
         "positions": positions,
+        "models": model_vectors(),
         "invalid": [{"why": why, "block": to_base64(data), "index": 1} for why, data in invalid.items()],
         "invalid_tracks": [{"why": why, "track": described | change} for why, change in changes.items()],
     }

@@ -8,6 +8,7 @@ import pytest
 
 from bunraku.codec.errors import DamagedBlock
 from bunraku.codec.extension.props import decode_prop_block, pack_prop_block, shift_limb
+from bunraku.motion.readers.gltf_file import parse_gltf_file
 from bunraku.playout.block_store import PropBlockStore
 from tests.vectors import props
 from tests.vectors.test_golden import committed
@@ -37,6 +38,24 @@ def test_golden_positions_have_the_recorded_states() -> None:
         found = stores[vector["track"]].states_at(vector["position"])
         assert found is not None
         assert [props.state_values(shift_limb(state, track.performer)) for state in found] == vector["states"]
+
+
+def test_golden_models_have_the_recorded_values() -> None:
+    for vector in OURS["models"]:
+        file = parse_gltf_file(base64.b64decode(vector["model"]))
+        (primitive,) = file.item("meshes", 0)["primitives"]
+        accessors = primitive["attributes"]
+        for name, accessor, width in (
+            ("positions", accessors["POSITION"], 3),
+            ("normals", accessors["NORMAL"], 3),
+            ("colours", accessors["COLOR_0"], 4),
+            ("finishes", accessors["_FINISH"], 4),
+            ("indices", primitive["indices"], 1),
+        ):
+            values = file.read_accessor(accessor, width)[:, :3]
+            assert values.reshape(-1) == pytest.approx(vector[name], abs=1e-9)
+        form = file.item("nodes", 0)["extras"]
+        assert form == {key: vector[key] for key in ("pitch", "height", "palmOffset")}
 
 
 def test_invalid_blocks_and_tracks_are_refused() -> None:

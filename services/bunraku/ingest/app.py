@@ -31,8 +31,8 @@ from bunraku.ingest.performance import PerformanceOperation
 from bunraku.ingest.performers import PerformersOperation, PerformersRequest
 from bunraku.ingest.persistence import StoreOutcome
 from bunraku.ingest.progress import UploadProgress
-from bunraku.ingest.prop import PropOperation
-from bunraku.ingest.prop_routes import add_prop_routes
+from bunraku.ingest.props.operation import PropOperation
+from bunraku.ingest.props.routes import add_prop_routes
 from bunraku.ingest.recording import RecordingOperation
 from bunraku.ingest.reencoding import ReencodingOperation
 from bunraku.ingest.scene import SceneOperation

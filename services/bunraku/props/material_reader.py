@@ -68,7 +68,7 @@ class MaterialReader:
             infos[TextureUse.BASE_COLOUR] = _members(specular, "diffuseTexture")
         else:
             colour = _numbers(metallic, "baseColorFactor", (1.0,) * 4, where)
-            # an asset that says nothing of metal means none
+            # a material without these members is not metallic
             finish = (
                 _number(metallic, "metallicFactor", 1.0 if metallic else 0.0, where),
                 _number(metallic, "roughnessFactor", 1.0, where),

@@ -21,13 +21,13 @@ _SMALLEST_SIZE = 1e-9
 _DEFAULT_LENGTH_M = 0.4
 """Length of a prop whose unit is unknown."""
 _ORIGIN_TOLERANCE = 0.05
-"""Distance of the origin from the box of a prop that is held there, as a share of its length."""
+"""Largest distance of a prop's origin from its box if the prop is held there, as a share of its length."""
 _LYING_SLENDERNESS = 2.0
 """Height by width from which a prop does not stand, but lies."""
 _SLAB_M = 0.04
-"""Half the width of a hand: what of a prop is inside it."""
+"""Half the width of a hand: the parts of a prop within it are held."""
 _MAX_SHAFT_RADIUS_M = 0.035
-"""Radius up to which a hand closes around a shaft; what is thicker lies in the palm."""
+"""Radius up to which a hand closes around a shaft; a thicker prop lies in the palm."""
 _PALM_GAP_M = 0.01
 _MAX_PALM_OFFSET_M = 0.5
 
@@ -41,7 +41,7 @@ class Grip(StrEnum):
 
 
 class Placing(NamedTuple):
-    """Positions (n, 3) of a prop in metres from its grip, and what was guessed about them."""
+    """Positions (n, 3) of a prop in metres from its grip, and the guesses about them."""
 
     positions: Array
     guessed: list[str]
@@ -49,7 +49,7 @@ class Placing(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class PropForm:
-    """How a prop lies and is held; the frame is that of the prop."""
+    """Rest of a prop on the floor, and its place in a hand; the frame is that of the prop."""
 
     pitch: float
     """Turn about x on the floor, in radians: 0 if it stands."""
@@ -81,7 +81,7 @@ def place_prop(positions: Array, length: float | None = None, grip: Grip | None 
 
 
 def find_form(positions: Array, triangles: Triangles) -> PropForm:
-    """Return how a prop lies and is held, from its positions in metres from the grip."""
+    """Return the form of a prop from its positions, in metres from the grip."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     width = max(high[0] - low[0], high[2] - low[2])
     lies = high[1] - low[1] > _LYING_SLENDERNESS * width

@@ -22,7 +22,7 @@ SHORTEST_EDGE = 1 / 160
 
 
 class ReadProp(NamedTuple):
-    """A model, and what was guessed about it."""
+    """A model, and the guesses about it."""
 
     model: PropModel
     guessed: list[str]

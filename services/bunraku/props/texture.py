@@ -11,7 +11,7 @@ from bunraku.motion.rotation import Array
 
 
 class Wrap(IntEnum):
-    """What lies beyond the border of an image (glTF 2.0, 5.26: wrapS)."""
+    """Continuation of an image beyond its border (glTF 2.0, 5.26: wrapS)."""
 
     CLAMP = 33071
     MIRROR = 33648
@@ -26,7 +26,7 @@ class Texture:
     """Values (height, width, 4), 0..1, the first row at v = 0."""
     wraps: tuple[Wrap, Wrap] = (Wrap.REPEAT, Wrap.REPEAT)
     is_smooth: bool = True
-    """Whether values between the centres of pixels are interpolated."""
+    """True if values between the centres of pixels are interpolated."""
 
     def sample(self, coordinates: Array) -> Array:
         """Return the values (n, 4) at texture coordinates (n, 2)."""

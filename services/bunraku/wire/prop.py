@@ -22,7 +22,7 @@ class PropKind(StrEnum):
 
 
 STORED_PROP_PATTERN = r"[a-z2-7]{20}"
-"""Ids of stored props, which are kinds too (proto/http.md, 7.11)."""
+"""Ids of stored props, which are kinds too (proto/http.md, 7.10)."""
 
 
 def is_stored_prop(kind: str) -> bool:

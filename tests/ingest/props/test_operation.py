@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bunraku.ingest.progress import UploadProgress
-from bunraku.ingest.prop import PropFit, PropOperation, create_prop_job, prop_json
+from bunraku.ingest.props.operation import PropFit, PropOperation, create_prop_job, prop_json
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.props.placing import Grip
 from bunraku.runtime.context import open_context

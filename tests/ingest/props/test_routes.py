@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx2
 import pytest
 
-from bunraku.ingest.prop import MAX_FILE_BYTES
+from bunraku.ingest.props.operation import MAX_FILE_BYTES
 from bunraku.motion.readers.gltf_file import parse_gltf_file
 from tests.props.samples import box_glb
 from tests.servers import run_server

@@ -1,4 +1,4 @@
-"""Routes of the library of props (proto/http.md, 7.11)."""
+"""Routes of the library of props (proto/http.md, 7.10)."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fastapi.responses import JSONResponse
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.immutable_resource import immutable_headers, not_modified
 from bunraku.ingest.labels import require_ownership
-from bunraku.ingest.prop import PropFit, PropOperation, create_prop_job, prop_json
+from bunraku.ingest.props.operation import PropFit, PropOperation, create_prop_job, prop_json
 from bunraku.ingest.upload import UPLOAD_NAME_PATTERN, UploadReceiver
 from bunraku.props.model_file import MEDIA_TYPE
 from bunraku.props.placing import MAX_LENGTH_M, MIN_LENGTH_M, Grip
