@@ -12,7 +12,7 @@ from bunraku.client.server_problem import ServerProblem
 from bunraku.http.access_control import Role
 from bunraku.motion.readers.gltf_file import parse_gltf_file
 from bunraku.wire.prop import Prop, PropState
-from tests.credentials import SECRET, make_token
+from tests.credentials import SECRET, bearer_headers, make_token
 from tests.e2e.test_props import see_props
 from tests.props.samples import box_glb
 from tests.servers import make_bvh_clip, run_server
@@ -74,6 +74,10 @@ async def test_guests_see_props_of_a_session_and_store_none(tmp_path: Path, staf
                 with pytest.raises(ServerProblem) as raised:
                     await refused
                 assert raised.value.status == 403
+        async with httpx2.AsyncClient(base_url=url, headers=bearer_headers(make_token(Role.VIEW))) as viewer:
+            headers = (await viewer.get(f"/v1/props/{prop['id']}/model")).headers
+            assert "private" in headers["cache-control"]
+            assert {"authorization", "accept-encoding"} <= {name.strip().lower() for name in headers["vary"].split(",")}
         async with httpx2.AsyncClient(base_url=url) as stranger:
             assert (await stranger.get(f"/v1/props/{prop['id']}/model")).status_code == 401
 
