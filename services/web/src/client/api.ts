@@ -3,7 +3,7 @@
 import { pageTranslator } from "../i18n/translator";
 import type { CrowdPresence, PropPresence } from "../wire/messages";
 import { type Access, pageAccess } from "./access";
-import { ProblemError } from "./problem";
+import { sendFile } from "./file-upload";
 
 /** Motion as described by the server; further members are kept. */
 export interface Motion {
@@ -55,8 +55,11 @@ export interface SessionEdit {
   motion?: string;
   /** Policy of each limb to open to the crowd, by name or number of the limb; null closes it. */
   crowd?: Readonly<Record<string, "median" | "trimmed mean" | "turns" | "vote" | null>>;
-  /** Kind of each prop to bring on the stage, by number (0 to 7); null removes it. */
-  props?: Readonly<Record<string, "fan" | "umbrella" | "ball" | "branch" | null>>;
+  /**
+   * Kind of each prop to bring on the stage, by number (0 to 7): "fan", "umbrella", "ball", "branch" or the id of a
+   * stored prop; null removes it.
+   */
+  props?: Readonly<Record<string, string | null>>;
 }
 
 /**
@@ -236,45 +239,28 @@ export interface StoredTakes {
 export const PROGRESS_INTERVAL_MS = 400;
 
 /**
- * Upload a motion capture file, and store each of its takes. An XMLHttpRequest is used, since fetch does not report
- * the progress of sending; the progress on the server is polled.
+ * Upload a motion capture file, and store each of its takes. The progress on the server is polled.
  *
  * @throws ProblemError if the upload fails, or the reason of `signal` if it is aborted
  */
-export function uploadTakes(
+export async function uploadTakes(
   file: File,
   onProgress?: (progress: UploadProgress) => void,
   signal?: AbortSignal,
 ): Promise<StoredTakes> {
-  return new Promise((resolve, reject) => {
-    signal?.throwIfAborted();
-    const uploadId = createUploadId();
-    const request = new XMLHttpRequest();
-    const ended = new AbortController();
-    const cancel = () => request.abort();
-    signal?.addEventListener("abort", cancel, { once: true });
-    request.upload.addEventListener("progress", ({ loaded, total }) => {
-      onProgress?.({ stage: "sending", share: total > 0 ? loaded / total : 0 });
+  const uploadId = createUploadId();
+  const ended = new AbortController();
+  const path = `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${uploadId}&takes=all`;
+  try {
+    const stored = await sendFile(path, file, {
+      signal,
+      onProgress: (share) => onProgress?.({ stage: "sending", share }),
+      onSent: () => void (onProgress && pollProgress(uploadId, onProgress, ended.signal)),
     });
-    request.upload.addEventListener("load", () => {
-      if (onProgress) void pollProgress(uploadId, onProgress, ended.signal);
-    });
-    request.addEventListener("loadend", () => {
-      ended.abort();
-      signal?.removeEventListener("abort", cancel);
-    });
-    request.addEventListener("abort", () => reject(signal?.reason as Error));
-    request.addEventListener("error", () => reject(ProblemError.unreachable()));
-    request.addEventListener("load", () => {
-      if (request.status >= 300)
-        reject(pageAccess.reportProblem(ProblemError.from(request.status, request.responseText)));
-      else resolve(translateReasons(JSON.parse(request.responseText) as StoredTakes));
-    });
-    request.open("POST", `/v1/motions?filename=${encodeURIComponent(file.name)}&upload=${uploadId}&takes=all`);
-    request.setRequestHeader("Content-Type", "application/octet-stream");
-    for (const [name, value] of Object.entries(pageAccess.authorization())) request.setRequestHeader(name, value);
-    request.send(file);
-  });
+    return translateReasons(stored as StoredTakes);
+  } finally {
+    ended.abort();
+  }
 }
 
 /** Translate the server's reasons for takes that were not stored. */
@@ -315,7 +301,7 @@ export function createUploadId(): string {
 }
 
 /** Return the query of a URL with these parameters, without the empty ones. */
-function queryOf(parameters: Record<string, string | undefined>): string {
+export function queryOf(parameters: Record<string, string | undefined>): string {
   const pairs = Object.entries(parameters).flatMap(([name, value]) =>
     value ? `${name}=${encodeURIComponent(value)}` : [],
   );

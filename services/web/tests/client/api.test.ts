@@ -1,5 +1,6 @@
 import { afterEach, describe, expect, test, vi } from "vitest";
 import * as api from "../../src/client/api";
+import { FakeRequest } from "./fake-request";
 
 afterEach(() => {
   vi.unstubAllGlobals();
@@ -124,62 +125,29 @@ describe("problems", () => {
 });
 
 describe("uploads", () => {
-  /** Fake XMLHttpRequest, controlled by the test. */
-  class Request extends EventTarget {
-    static last: Request;
-    readonly upload = new EventTarget();
-    readonly headers: Record<string, string> = {};
-    status = 0;
-    responseText = "";
-    arguments: unknown[] = [];
-    constructor() {
-      super();
-      Request.last = this;
-    }
-    open(...parameters: unknown[]): void {
-      this.arguments = parameters;
-    }
-    setRequestHeader(name: string, value: string): void {
-      this.headers[name] = value;
-    }
-    send(body: unknown): void {
-      this.arguments.push(body);
-    }
-    abort(): void {
-      this.dispatchEvent(new Event("abort"));
-      this.dispatchEvent(new Event("loadend"));
-    }
-    respond(status: number, text: string): void {
-      this.status = status;
-      this.responseText = text;
-      this.dispatchEvent(new Event("load"));
-      this.dispatchEvent(new Event("loadend"));
-    }
-  }
-
   const file = new File(["HIERARCHY"], "my dance.bvh");
 
   test("send the file, report progress, and return the motion", async () => {
-    vi.stubGlobal("XMLHttpRequest", Request);
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
     const reported: api.UploadProgress[] = [];
     const motion = api.uploadTakes(file, (progress) => reported.push(progress));
-    expect(Request.last.arguments).toEqual([
+    expect(FakeRequest.last.arguments).toEqual([
       "POST",
       expect.stringMatching(/^\/v1\/motions\?filename=my%20dance.bvh&upload=[0-9a-f]{32}&takes=all$/),
       file,
     ]);
-    expect(Request.last.headers).toEqual({ "Content-Type": "application/octet-stream" });
-    Request.last.upload.dispatchEvent(Object.assign(new Event("progress"), { loaded: 3, total: 9 }));
+    expect(FakeRequest.last.headers).toEqual({ "Content-Type": "application/octet-stream" });
+    FakeRequest.last.upload.dispatchEvent(Object.assign(new Event("progress"), { loaded: 3, total: 9 }));
     const reason = { take: "T-pose", title: "Nothing moves", detail: "it is a single pose", line: null, hint: null };
     const stored = { items: [{ id: "abc" }], skipped: [reason], pending: ["run"] };
-    Request.last.respond(201, JSON.stringify(stored));
+    FakeRequest.last.respond(201, JSON.stringify(stored));
     expect(await motion).toEqual(stored);
     expect(reported).toEqual([{ stage: "sending", share: 1 / 3 }]);
   });
 
   test("poll the progress on the server after sending", async () => {
     vi.useFakeTimers();
-    vi.stubGlobal("XMLHttpRequest", Request);
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
     const responses = [
       { stage: "receiving", share: 1 },
       { stage: "waiting", share: 0 },
@@ -197,9 +165,9 @@ describe("uploads", () => {
     const motion = api.uploadTakes(file, (progress) => reported.push(progress));
     await vi.advanceTimersByTimeAsync(5 * api.PROGRESS_INTERVAL_MS);
     expect(paths).toEqual([]);
-    Request.last.upload.dispatchEvent(new Event("load"));
+    FakeRequest.last.upload.dispatchEvent(new Event("load"));
     await vi.advanceTimersByTimeAsync(4.5 * api.PROGRESS_INTERVAL_MS);
-    Request.last.respond(201, '{"items": [], "skipped": [], "pending": []}');
+    FakeRequest.last.respond(201, '{"items": [], "skipped": [], "pending": []}');
     await motion;
     await vi.advanceTimersByTimeAsync(5 * api.PROGRESS_INTERVAL_MS);
     expect(reported).toEqual([
@@ -207,19 +175,19 @@ describe("uploads", () => {
       { stage: "encoding", share: 0.25 },
       { stage: "encoding", share: 0.5 },
     ]);
-    const uploadId = new URLSearchParams(String(Request.last.arguments[1]).split("?")[1]).get("upload");
+    const uploadId = new URLSearchParams(String(FakeRequest.last.arguments[1]).split("?")[1]).get("upload");
     expect(paths).toEqual(new Array(5).fill(`/v1/uploads/${uploadId}`));
   });
 
   test("fail with the server's problem", async () => {
-    vi.stubGlobal("XMLHttpRequest", Request);
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
     const motion = api.uploadTakes(file);
-    Request.last.respond(422, '{"title": "Not a motion", "detail": "NaN", "line": 7}');
+    FakeRequest.last.respond(422, '{"title": "Not a motion", "detail": "NaN", "line": 7}');
     await expect(motion).rejects.toMatchObject({ title: "Not a motion", line: 7 });
   });
 
   test("reject when aborted", async () => {
-    vi.stubGlobal("XMLHttpRequest", Request);
+    vi.stubGlobal("XMLHttpRequest", FakeRequest);
     const cancel = new AbortController();
     const motion = api.uploadTakes(file, undefined, cancel.signal);
     cancel.abort();
