@@ -1,9 +1,12 @@
 /** Export of motions as files, with its progress in the library. */
 import { downloadMotion, downloadProps } from "../client/motion-download";
 import { ProblemError } from "../client/problem";
+import { getProp } from "../client/stored-props";
 import { type ExportFormat, type ExportSource, exportFile, type PropSource } from "../export/export-file";
 import { fileName } from "../export/file-name";
+import type { NamedPropModel } from "../export/glb-props";
 import { translate } from "../i18n/translator";
+import { isStoredKind } from "../motion/props";
 import type { LibraryPanel } from "../ui/library/library-panel";
 import type { MotionItem } from "../ui/library/motion-item";
 
@@ -56,7 +59,7 @@ export async function exportMotion(
   }
 }
 
-/** Download the props of a motion, and the code of their meshes if there are any. */
+/** Download the props of a motion, and the models of those that can be drawn. */
 async function loadProps(
   motion: string,
   performers: readonly number[],
@@ -64,8 +67,25 @@ async function loadProps(
 ): Promise<PropSource | null> {
   const stores = await downloadProps(motion, signal);
   if (stores.length === 0) return null;
-  const { createPropShape } = await import("../stage/props/prop-shape").catch(() => {
+  const { PropModels } = await import("../stage/props/prop-models").catch(() => {
     throw ProblemError.unreachable();
   });
-  return { stores, performers, createModel: createPropShape };
+  const source = new PropModels();
+  const kinds = new Set(stores.flatMap(({ track }) => track.kinds));
+  const models = new Map<string, NamedPropModel>();
+  for (const kind of kinds) {
+    const model = await source.load(kind);
+    signal.throwIfAborted();
+    if (model) models.set(kind, { ...model, name: await nameOf(kind) });
+  }
+  return { stores, performers, models };
+}
+
+/** Return the name of a kind for the file. A stored prop without a known name has its id. */
+function nameOf(kind: string): Promise<string> | string {
+  if (!isStoredKind(kind)) return kind;
+  return getProp(kind).then(
+    ({ name }) => name,
+    () => kind,
+  );
 }

@@ -127,6 +127,7 @@ export class StageController {
     this.hands.crowdMember = playback?.viewer ?? null;
     this.hands.puppeteer = playback?.puppeteer ?? null;
     this.#body = null;
+    if (playback) this.stage.access = playback.access;
     this.updatePerformers();
   }
 

@@ -1,12 +1,11 @@
 /** Export of motions as a file, computed in time slices so that the page stays responsive. */
 
-import type { PropKind } from "../motion/props";
 import { type Figure, figureKey } from "../motion/skeleton";
 import type { MotionBlockStore } from "../playout/block-store";
 import type { PropBlockStore } from "../playout/prop-store";
 import { writeBvh } from "./bvh";
 import { type AnimatedPuppet, type PuppetModel, writeGlb } from "./glb";
-import type { PropModel } from "./glb-props";
+import type { NamedPropModel } from "./glb-props";
 import { sampleProps } from "./prop-samples";
 import { type ExtensionStores, type IncrementalTask, type SampledMotion, sampleMotion } from "./sampled-motion";
 import { runInSlices } from "./time-slice";
@@ -26,11 +25,11 @@ export interface PuppetModelSource {
   renderFacePng(): Promise<Uint8Array<ArrayBuffer>>;
 }
 
-/** Blocks of the props of the motion, the numbers of the exported performers on the stage, and meshes by kind. */
+/** Blocks of the props of the motion, the numbers of the exported performers on the stage, and models by kind. */
 export interface PropSource {
   readonly stores: readonly PropBlockStore[];
   readonly performers: readonly number[];
-  createModel(kind: PropKind): PropModel;
+  readonly models: ReadonlyMap<string, NamedPropModel>;
 }
 
 export interface ExportOptions {
@@ -78,7 +77,7 @@ export async function exportFile(
       await runInSlices(createModels(motions, puppets), sliceOptions(0.5, 0.5)),
       name,
       await puppets.renderFacePng(),
-      props ? { props: sampleProps(props.stores, motions[0], props.performers), createModel: props.createModel } : null,
+      props ? { props: sampleProps(props.stores, motions[0], props.performers), models: props.models } : null,
     );
   };
   const parts = await runInSlices(await write(), sliceOptions(0.5, 1));

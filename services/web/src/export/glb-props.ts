@@ -1,13 +1,14 @@
 /** Props of a GLB file: meshes that move with the hands of the puppets, or lie on the floor. */
 
 import type { PropState } from "../codec/extension/props";
+import type { PropModel, PropShape } from "../motion/prop-model";
 import { PropMovement } from "../motion/prop-movement";
 import {
   createPropTransform,
   GRIP_SHARE,
   heldTransform,
   laidTransform,
-  type PropKind,
+  type PropForm,
   type PropTransform,
 } from "../motion/props";
 import { multiply, type Numbers, rotate } from "../motion/rotation";
@@ -18,17 +19,9 @@ import type { ExportSkeleton } from "./export-skeleton";
 import { frameTimes, type GltfBuilder, writeRotation } from "./gltf";
 import type { SampledMotion } from "./sampled-motion";
 
-/** Mesh of a prop in its own frame: three numbers per vertex, and triangles. Colours are linear RGB. */
-export interface PropModel {
-  readonly positions: readonly number[];
-  readonly normals: readonly number[];
-  readonly colours: readonly number[];
-  readonly indices: readonly number[];
-}
-
 /** A prop of a motion, with its state in each frame; null while it is not on the stage. */
 export interface SampledProp {
-  readonly kind: PropKind;
+  readonly kind: string;
   readonly states: readonly (PropState | null)[];
 }
 
@@ -105,36 +98,45 @@ export class PerformerPath {
   }
 }
 
-/** Props of a motion, and their meshes. */
+/** Model of a prop, and its name in the file. */
+export interface NamedPropModel extends PropModel {
+  readonly name: string;
+}
+
+/** Props of a motion, and the models of their kinds. */
 export interface ExportedProps {
   readonly props: readonly SampledProp[];
-  createModel(kind: PropKind): PropModel;
+  readonly models: ReadonlyMap<string, NamedPropModel>;
 }
 
 /**
- * Add the props, their meshes to `meshes`, and their movement in these frames. A prop that is not on the stage has no
- * size. Return the nodes, which belong to the root of the scene.
+ * Add the props that have a model, their meshes to `meshes`, and their movement in these frames. A prop that is not on
+ * the stage has no size. Return the nodes, which belong to the root of the scene.
  */
 export function addProps(
   asset: GltfBuilder,
   meshes: object[],
-  { props, createModel }: ExportedProps,
+  { props, models }: ExportedProps,
   performers: readonly PerformerPath[],
   { frames, fps }: Pick<SampledMotion, "frames" | "fps">,
 ): number[] {
   const times = asset.addAccessor(frameTimes(frames, fps), "SCALAR", { bounded: true });
   const floorHeight = Math.min(...performers.map((performer) => performer.floorHeight));
-  const meshOf = new Map<PropKind, number>();
-  return props.map(({ kind, states }, number) => {
-    const mesh = meshOf.get(kind) ?? meshes.push(createMesh(asset, kind, createModel(kind))) - 1;
+  const meshOf = new Map<string, number>();
+  let number = 0;
+  return props.flatMap(({ kind, states }) => {
+    const model = models.get(kind);
+    if (!model) return [];
+    const { name, form, shape } = model;
+    const mesh = meshOf.get(kind) ?? meshes.push(createMesh(asset, name, shape)) - 1;
     meshOf.set(kind, mesh);
-    const node = asset.nodes.push({ name: `prop ${number + 1} ${kind}`, mesh }) - 1;
+    const node = asset.nodes.push({ name: `prop ${++number} ${name}`, mesh }) - 1;
     const [translations, rotations] = [new Float32Array(frames * 3), new Float32Array(frames * 4)];
     const scales = new Float32Array(frames * 3);
     const movement = new PropMovement();
     for (let frame = 0; frame < frames; frame++) {
       const state = states[frame] ?? null;
-      const place = state && transformAt(kind, state, performers, floorHeight, frame / fps);
+      const place = state && transformAt(form, state, performers, floorHeight, frame / fps);
       if (state && place) {
         movement.moveTo(place, state, 1 / fps);
         scales.fill(1, frame * 3, frame * 3 + 3);
@@ -145,26 +147,26 @@ export function addProps(
     asset.addChannel(node, "translation", times, translations);
     asset.addChannel(node, "rotation", times, rotations);
     if (scales.includes(0)) asset.addChannel(node, "scale", times, scales, "STEP");
-    return node;
+    return [node];
   });
 }
 
 /** Return where a prop is at a time; null if the file has not the performer who holds it. */
 function transformAt(
-  kind: PropKind,
+  form: PropForm,
   { limb, place }: PropState,
   performers: readonly PerformerPath[],
   floorHeight: number,
   seconds: number,
 ): PropTransform | null {
-  if (limb === null) return laidTransform(kind, place, floorHeight, transform);
+  if (limb === null) return laidTransform(form, place, floorHeight, transform);
   const hand = limbWithinPerformer(limb);
   const grip = performers[performerOfLimb(limb)]?.gripAt(seconds, hand);
-  return grip ? heldTransform(kind, hand, grip, transform) : null;
+  return grip ? heldTransform(form, hand, grip, transform) : null;
 }
 
-function createMesh(asset: GltfBuilder, name: string, { positions, normals, colours, indices }: PropModel): object {
-  const vertices = (values: readonly number[], bounded = false) =>
+function createMesh(asset: GltfBuilder, name: string, { positions, normals, colours, indices }: PropShape): object {
+  const vertices = (values: ArrayLike<number>, bounded = false) =>
     asset.addAccessor(Float32Array.from(values), "VEC3", { target: "vertices", bounded });
   const attributes = { POSITION: vertices(positions, true), NORMAL: vertices(normals), COLOR_0: vertices(colours) };
   const triangles = asset.addAccessor(Uint16Array.from(indices), "SCALAR", { target: "indices" });

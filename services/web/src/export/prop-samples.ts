@@ -1,14 +1,13 @@
 /** Props of a motion sampled at every frame. */
 
 import type { PropState } from "../codec/extension/props";
-import { isPropKind } from "../motion/props";
 import type { PropBlockStore } from "../playout/prop-store";
 import { limbNumber, limbWithinPerformer, performerOfLimb } from "../wire/limbs";
 import type { SampledProp } from "./glb-props";
 import type { SampledMotion } from "./sampled-motion";
 
 /**
- * Sample the props of known kinds at the frames of a motion. Limbs are those of the exported `performers`, which have
+ * Sample the props at the frames of a motion. Limbs are those of the exported `performers`, which have
  * their numbers on the stage: a prop in a hand of another is not shown. All blocks must be loaded.
  */
 export function sampleProps(
@@ -25,6 +24,6 @@ export function sampleProps(
         const ownLimb = limb === null ? null : limbNumber(index, limbWithinPerformer(limb));
         props[prop].states[frame] = { limb: ownLimb, place };
       }
-    return props.flatMap(({ kind, states }) => (isPropKind(kind) ? [{ kind, states }] : []));
+    return props;
   });
 }

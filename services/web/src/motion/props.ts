@@ -7,9 +7,12 @@
 import { multiply, rotate } from "./rotation";
 import { addScaled, fromCoordinateAxis } from "./vector";
 
-/** Kinds that can be drawn, in the order in which they are offered. */
+/** Built-in kinds, in the order in which they are offered. Other kinds are ids of stored props. */
 export const PROP_KINDS = ["fan", "umbrella", "ball", "branch"] as const;
 export type PropKind = (typeof PROP_KINDS)[number];
+
+/** Kinds of props that the server stores: their ids. */
+const STORED_KIND = /^[a-z2-7]{20}$/;
 
 /** Position of the grip between the joint of the wrist and the tip of the hand, as a share of their distance. */
 export const GRIP_SHARE = 0.5;
@@ -27,22 +30,22 @@ export interface PropRest {
   readonly height: number;
 }
 
-export const PROP_RESTS: Readonly<Record<PropKind, PropRest>> = {
-  fan: { pitch: Math.PI / 2, height: 0.012 },
-  umbrella: umbrellaRest(),
-  ball: { pitch: 0, height: BALL_RADIUS_M },
-  branch: { pitch: Math.PI / 2, height: 0.03 },
-};
+/** How a prop is in a hand and on the floor. */
+export interface PropForm {
+  readonly rest: PropRest;
+  /**
+   * Distance of a held prop from the grip towards the side of the palm. 0: it has a shaft, which goes through the hand;
+   * above 0: it lies in the palm, as a ball does.
+   */
+  readonly palmOffset: number;
+}
 
-/**
- * Distance of a held prop from the grip towards the side of the palm. Props with a shaft go through the hand; a ball
- * lies in it.
- */
-export const PALM_OFFSETS_M: Readonly<Record<PropKind, number>> = {
-  fan: 0,
-  umbrella: 0,
-  ball: BALL_RADIUS_M + 0.015,
-  branch: 0,
+/** Forms of the kinds. */
+export const PROP_FORMS: Readonly<Record<PropKind, PropForm>> = {
+  fan: { rest: { pitch: Math.PI / 2, height: 0.012 }, palmOffset: 0 },
+  umbrella: { rest: umbrellaRest(), palmOffset: 0 },
+  ball: { rest: { pitch: 0, height: BALL_RADIUS_M }, palmOffset: BALL_RADIUS_M + 0.015 },
+  branch: { rest: { pitch: Math.PI / 2, height: 0.03 }, palmOffset: 0 },
 };
 
 /** Position in metres, and rotation w x y z, in the frame of the stage. */
@@ -56,20 +59,30 @@ export function createPropTransform(): PropTransform {
   return { position: new Float64Array(3), rotation: Float64Array.of(1, 0, 0, 0) };
 }
 
-/** Return true if props of this kind can be drawn. */
+/** Return true if this is one of the built-in kinds. */
 export function isPropKind(kind: string): kind is PropKind {
   return (PROP_KINDS as readonly string[]).includes(kind);
+}
+
+/** Return true if this kind is the id of a prop that the server stores. */
+export function isStoredKind(kind: string): boolean {
+  return STORED_KIND.test(kind);
 }
 
 /**
  * Write the transform of a prop in a hand (0 left, 1 right) into `out` and return it. `grip` is the frame of the hand's
  * joint at the grip.
  */
-export function heldTransform(kind: PropKind, hand: number, grip: PropTransform, out: PropTransform): PropTransform {
+export function heldTransform(
+  { palmOffset }: PropForm,
+  hand: number,
+  grip: PropTransform,
+  out: PropTransform,
+): PropTransform {
   const { position, rotation } = out;
   multiply(rotation, 0, grip.rotation, 0, gripRotation, 0);
   // The prop's z is the hand's x, which points to the left; at rest the palms face each other.
-  vector.set([0, 0, (hand === 0 ? -1 : 1) * PALM_OFFSETS_M[kind]]);
+  vector.set([0, 0, (hand === 0 ? -1 : 1) * palmOffset]);
   rotate(vector, 0, rotation, 0, vector, 0);
   addScaled(position, 0, grip.position, 0, vector, 0, 1);
   return out;
@@ -77,12 +90,11 @@ export function heldTransform(kind: PropKind, hand: number, grip: PropTransform,
 
 /** Write the transform of a prop that lies at a place [x, z, turn] of a floor at `floorHeight` into `out`; return it. */
 export function laidTransform(
-  kind: PropKind,
+  { rest: { pitch, height } }: PropForm,
   [x, z, turn]: readonly number[],
   floorHeight: number,
   out: PropTransform,
 ): PropTransform {
-  const { pitch, height } = PROP_RESTS[kind];
   fromCoordinateAxis(pitchRotation, 0, 0, pitch);
   fromCoordinateAxis(out.rotation, 0, 1, turn);
   multiply(out.rotation, 0, out.rotation, 0, pitchRotation, 0);

@@ -3,6 +3,7 @@
  * reads no clock.
  */
 import { type IUniform, Scene, Vector3, type WebGLRenderer } from "three";
+import { type Access, pageAccess } from "../client/access";
 import type { StagedPose } from "../motion/extension";
 import { type Figure, LIMBS } from "../motion/skeleton";
 import type { LightState } from "../playout/light-state";
@@ -62,6 +63,7 @@ export class Stage {
   /** Null until there is a prop. */
   #propGroup: PropGroup | null = null;
   #isLoadingProps = false;
+  #access = pageAccess;
   readonly #scenery = new Scenery(this.rig.floorOffset);
   readonly #lights = createLights();
   readonly #floorHeight: IUniform<number> = { value: 0 };
@@ -133,6 +135,15 @@ export class Stage {
    */
   get drawnHandles(): readonly (ScreenPosition | null)[] {
     return this.#drawnHandles;
+  }
+
+  /** Access to the server that has the models of the props; that of the page by default. */
+  set access(access: Access) {
+    if (access === this.#access) return;
+    this.#access = access;
+    // Its models are those of another server.
+    this.#propGroup?.dispose();
+    this.#propGroup = null;
   }
 
   /** Disables easing and swing. */
@@ -397,7 +408,7 @@ export class Stage {
     const chunk = await import("./props/prop-group").catch(() => null);
     this.#isLoadingProps = false;
     if (!chunk) return;
-    this.#propGroup = new chunk.PropGroup();
+    this.#propGroup = new chunk.PropGroup(this.#access);
     this.scene.add(this.#propGroup.group);
     this.#applyQuality();
   }

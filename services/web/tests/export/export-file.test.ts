@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
 import { type ExportFormat, exportFile } from "../../src/export/export-file";
+import { PROP_FORMS } from "../../src/motion/props";
 import type { Figure } from "../../src/motion/skeleton";
 import { PropBlockStore } from "../../src/playout/prop-store";
 import { createPropShape } from "../../src/stage/props/prop-shape";
@@ -86,7 +87,8 @@ test("a GLB has the props of the motion, other formats do not", async () => {
   const stores = [new PropBlockStore(goldenPropTracks()[0])];
   for (const { index, block } of propVectors().valid.filter(({ track }) => track === 0))
     stores[0].put(index, 0, decodeBase64(block));
-  const props = { stores, performers: [0], createModel: createPropShape };
+  const models = new Map([["fan", { name: "fan", form: PROP_FORMS.fan, shape: createPropShape("fan") }]]);
+  const props = { stores, performers: [0], models };
   const nodesOf = async (format: ExportFormat) => {
     const file = await exportFile(format, "a dance", [source], { puppets, props });
     return jsonOf(Buffer.from(await file.arrayBuffer())).nodes.map(({ name }) => name);

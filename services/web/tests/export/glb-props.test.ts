@@ -3,12 +3,14 @@ import { GLTFLoader } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { describe, expect, test } from "vitest";
 import type { PropState } from "../../src/codec/extension/props";
 import { writeGlb } from "../../src/export/glb";
-import type { SampledProp } from "../../src/export/glb-props";
+import type { NamedPropModel, SampledProp } from "../../src/export/glb-props";
 import type { SampledMotion } from "../../src/export/sampled-motion";
-import { PROP_RESTS } from "../../src/motion/props";
+import { PROP_FORMS, PROP_KINDS } from "../../src/motion/props";
 import { JOINTS, TIP_JOINTS } from "../../src/motion/skeleton";
+import { readPropModel } from "../../src/stage/props/prop-file";
 import { createPropShape } from "../../src/stage/props/prop-shape";
 import { createPuppetModel } from "../../src/stage/puppet/puppet-model";
+import { EXTRAS, STORED_ID, writePropModel } from "../prop-model-file";
 import { createOtherFigure } from "../stage/puppet/figures";
 import { extendedMotion, joinParts, runToCompletion, turningMotion } from "./motions";
 
@@ -19,9 +21,13 @@ const MOVE_FRAMES = 8;
 const ON_FLOOR: PropState = { limb: null, place: [1, -0.5, 0.4] };
 
 /** Write motions with props as GLB and read them with three.js. Return the nodes at a frame. */
-async function read(motions: SampledMotion[], props: SampledProp[]) {
+async function read(motions: SampledMotion[], props: SampledProp[], stored?: NamedPropModel) {
   const puppets = motions.map((motion) => ({ motion, model: createPuppetModel(motion.figure) }));
-  const exported = { props, createModel: createPropShape };
+  const models = new Map<string, NamedPropModel>(
+    PROP_KINDS.map((kind) => [kind, { name: kind, form: PROP_FORMS[kind], shape: createPropShape(kind) }]),
+  );
+  if (stored) models.set(STORED_ID, stored);
+  const exported = { props, models };
   const file = await joinParts(runToCompletion(writeGlb(puppets, "a dance", null, exported)));
   const { scene, animations } = await new GLTFLoader().parseAsync(file, "");
   const mixer = new AnimationMixer(scene);
@@ -85,7 +91,7 @@ describe("a prop in a GLB file", () => {
     const laid = at(35).prop("prop_1_umbrella");
     expect([laid.position.x, laid.position.z]).toEqual([expect.closeTo(1, 5), expect.closeTo(-0.5, 5)]);
     const shaft = new Vector3(0, 1, 0).applyQuaternion(laid.getWorldQuaternion(new Quaternion()));
-    expect(shaft.y).toBeCloseTo(Math.cos(PROP_RESTS.umbrella.pitch), 4);
+    expect(shaft.y).toBeCloseTo(Math.cos(PROP_FORMS.umbrella.rest.pitch), 4);
   });
 
   test("is seen only while it is on the stage", async () => {
@@ -111,5 +117,25 @@ describe("a prop in a GLB file", () => {
     const { indices, colours } = createPropShape("branch");
     expect(first.geometry.index?.count).toBe(indices.length);
     expect(first.geometry.getAttribute("color").count).toBe(colours.length / 3);
+  });
+
+  test("of a kind without a model is left out", async () => {
+    const kinds = [STORED_ID, "ball"];
+    const { scene } = await read(
+      [turningMotion()],
+      kinds.map((kind) => ({ kind, states: throughout(ON_FLOOR) })),
+    );
+    expect(scene.getObjectByName("prop_1_ball")).toBeDefined();
+    expect(scene.getObjectByName("prop_2_ball")).toBeUndefined();
+  });
+
+  test("that is stored has its name, mesh and form", async () => {
+    const stored = { ...readPropModel(writePropModel()), name: "sword" };
+    const { at } = await read([turningMotion()], [{ kind: STORED_ID, states: throughout(ON_FLOOR) }], stored);
+    const { at: atFan } = await read([turningMotion()], [{ kind: "fan", states: throughout(ON_FLOOR) }]);
+    const { geometry, position } = at(3).prop("prop_1_sword");
+    const floor = atFan(3).prop("prop_1_fan").position.y - PROP_FORMS.fan.rest.height;
+    expect([...(geometry.index?.array ?? [])]).toEqual([0, 1, 2, 1, 3, 2]);
+    expect(position.y).toBeCloseTo(floor + EXTRAS.height, 4);
   });
 });

@@ -3,10 +3,10 @@ import {
   createPropTransform,
   heldTransform,
   isPropKind,
+  isStoredKind,
   laidTransform,
-  PALM_OFFSETS_M,
+  PROP_FORMS,
   PROP_KINDS,
-  PROP_RESTS,
   type PropKind,
   type PropTransform,
   UMBRELLA,
@@ -25,7 +25,7 @@ function placed({ position, rotation }: PropTransform, point: readonly number[])
 /** Return the transform in a hand whose joint is turned so, with the grip at this place. */
 function heldBy(hand: number, kind: PropKind = "fan", rotation = [1, 0, 0, 0]): PropTransform {
   const grip = { position: Float64Array.from(GRIP), rotation: Float64Array.from(rotation) };
-  return heldTransform(kind, hand, grip, createPropTransform());
+  return heldTransform(PROP_FORMS[kind], hand, grip, createPropTransform());
 }
 
 test("a held prop points to the front of a hanging hand", () => {
@@ -50,25 +50,25 @@ test("a held prop turns with the hand", () => {
 
 test("a ball lies in the palms, which face each other", () => {
   const [left, right] = [0, 1].map((hand) => heldBy(hand, "ball").position[0] - GRIP[0]);
-  expect(left).toBeCloseTo(-PALM_OFFSETS_M.ball, 12);
-  expect(right).toBeCloseTo(PALM_OFFSETS_M.ball, 12);
+  expect(left).toBeCloseTo(-PROP_FORMS.ball.palmOffset, 12);
+  expect(right).toBeCloseTo(PROP_FORMS.ball.palmOffset, 12);
 });
 
 test("a laid prop is at its place, turned, at the height of its kind above the floor", () => {
   for (const kind of PROP_KINDS) {
-    const laid = laidTransform(kind, [1, 2, Math.PI / 2], 0.4, createPropTransform());
-    expect([...laid.position]).toEqual([1, 0.4 + PROP_RESTS[kind].height, 2]);
+    const laid = laidTransform(PROP_FORMS[kind], [1, 2, Math.PI / 2], 0.4, createPropTransform());
+    expect([...laid.position]).toEqual([1, 0.4 + PROP_FORMS[kind].rest.height, 2]);
     const [x, y, z] = placed(laid, [0, 1, 0]);
     // The front is towards x, and the shaft leans to it.
-    expect(x - 1).toBeCloseTo(Math.sin(PROP_RESTS[kind].pitch), 12);
-    expect(y - laid.position[1]).toBeCloseTo(Math.cos(PROP_RESTS[kind].pitch), 12);
+    expect(x - 1).toBeCloseTo(Math.sin(PROP_FORMS[kind].rest.pitch), 12);
+    expect(y - laid.position[1]).toBeCloseTo(Math.cos(PROP_FORMS[kind].rest.pitch), 12);
     expect(z).toBeCloseTo(2, 12);
   }
 });
 
 test("a laid umbrella touches the floor with its rim and the end of its handle", () => {
   const { rimHeight, rimRadius, handleLength, handleRadius } = UMBRELLA;
-  const laid = laidTransform("umbrella", [0, 0, 0.7], 0.1, createPropTransform());
+  const laid = laidTransform(PROP_FORMS.umbrella, [0, 0, 0.7], 0.1, createPropTransform());
   expect(placed(laid, [0, rimHeight, rimRadius])[1]).toBeCloseTo(0.1, 12);
   expect(placed(laid, [0, -handleLength, handleRadius])[1]).toBeCloseTo(0.1, 12);
   for (let angle = 0; angle < 6.3; angle += 0.1) {
@@ -77,7 +77,17 @@ test("a laid umbrella touches the floor with its rim and the end of its handle",
   }
 });
 
-test("other kinds are not drawn", () => {
+test("kinds are built-in or ids of stored props", () => {
   expect(PROP_KINDS.every(isPropKind)).toBe(true);
-  for (const kind of ["", "sword", "toString"]) expect(isPropKind(kind)).toBe(false);
+  expect(PROP_KINDS.some(isStoredKind)).toBe(false);
+  expect(isStoredKind("abcdefghijklmnopq234")).toBe(true);
+  for (const kind of [
+    "",
+    "sword",
+    "toString",
+    "abcdefghijklmnopq2345",
+    "abcdefghijklmnopq01\n",
+    "ABCDEFGHIJKLMNOPQ234",
+  ])
+    expect(isPropKind(kind) || isStoredKind(kind), kind).toBe(false);
 });

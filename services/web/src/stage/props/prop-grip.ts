@@ -1,7 +1,7 @@
 /** Fingers of hands that hold props: they close around a shaft, or lie around a ball. */
 import type { StagedPose } from "../../motion/extension";
 import { CHAIN_COUNT, chainDirection, FINGERS, type Hands, MAX_CHAIN_JOINTS } from "../../motion/hands";
-import { isPropKind, type PropKind } from "../../motion/props";
+import type { PropForm } from "../../motion/props";
 import { limbWithinPerformer, performerOfLimb } from "../../wire/limbs";
 import type { PropPresence } from "../../wire/messages";
 
@@ -13,7 +13,6 @@ interface Grip {
 
 const SHAFT: Grip = { thumb: [0.35, 0.5, 0.5], finger: [1.15, 1.35, 0.7] };
 const BALL: Grip = { thumb: [0.3, 0.2, 0.1], finger: [0.3, 0.3, 0.2] };
-const GRIPS: Readonly<Record<PropKind, Grip>> = { fan: SHAFT, umbrella: SHAFT, ball: BALL, branch: SHAFT };
 /** Bend of fingers that the motion does not move, in radians: about that of the models. */
 const REST_BEND_RAD = 0.12;
 /** Time in which a hand closes and opens, in seconds. */
@@ -26,6 +25,9 @@ const BEND_AXES = Array.from({ length: CHAIN_COUNT }, (_, chain) => {
   const palm = chain < HAND_CHAINS ? -1 : 1;
   return [0, z * palm, -y * palm];
 });
+
+/** A prop that is drawn, and its form. */
+export type FormedProp = PropPresence & { readonly form: PropForm };
 
 /** Grip of one hand. */
 interface HandGrip {
@@ -44,11 +46,14 @@ export class PropGrip {
   #closedHands = "";
 
   /** Advance by `seconds`, with Infinity at once, to what the performer of this number holds. */
-  update(props: readonly PropPresence[], performer: number, seconds: number): void {
+  update(props: readonly FormedProp[], performer: number, seconds: number): void {
     for (const hand of this.#hands) hand.isHolding = false;
-    for (const { kind, limb } of props)
-      if (limb !== null && performerOfLimb(limb) === performer && isPropKind(kind))
-        Object.assign(this.#hands[limbWithinPerformer(limb)], { grip: GRIPS[kind], isHolding: true });
+    for (const { form, limb } of props)
+      if (limb !== null && performerOfLimb(limb) === performer)
+        Object.assign(this.#hands[limbWithinPerformer(limb)], {
+          grip: form.palmOffset > 0 ? BALL : SHAFT,
+          isHolding: true,
+        });
     for (const hand of this.#hands) {
       const step = seconds / CLOSING_S;
       hand.closed = hand.isHolding ? Math.min(1, hand.closed + step) : Math.max(0, hand.closed - step);

@@ -12,27 +12,22 @@ import {
   Mesh,
   Quaternion,
   Sphere,
+  Uint16BufferAttribute,
   Vector3,
 } from "three";
+import type { Access } from "../../client/access";
 import type { StagedPose } from "../../motion/extension";
+import type { PropModel, PropShape } from "../../motion/prop-model";
 import { PropMovement } from "../../motion/prop-movement";
-import {
-  createPropTransform,
-  GRIP_SHARE,
-  heldTransform,
-  isPropKind,
-  laidTransform,
-  type PropKind,
-  type PropTransform,
-} from "../../motion/props";
+import { createPropTransform, GRIP_SHARE, heldTransform, laidTransform, type PropTransform } from "../../motion/props";
 import { limbWithinPerformer, performerOfLimb } from "../../wire/limbs";
 import type { PropPresence } from "../../wire/messages";
 import type { ScreenBox } from "../camera/screen-box";
 import type { ScreenProjection } from "../camera/screen-projection";
 import type { Performer } from "../puppet/performer";
-import { PropGrip } from "./prop-grip";
+import { type FormedProp, PropGrip } from "./prop-grip";
 import { createPropMaterial, SimplePropMaterial } from "./prop-material";
-import { createPropShape } from "./prop-shape";
+import { PropModels } from "./prop-models";
 
 /** Factor of a prop's radius for its near side, which is larger in the picture. */
 const NEARNESS = 1.15;
@@ -48,15 +43,19 @@ interface DrawnProp {
 
 export class PropGroup {
   readonly group = new Group();
+  readonly #models: PropModels;
   readonly #props = new Map<string, DrawnProp>();
-  readonly #geometries = new Map<PropKind, BufferGeometry>();
+  /** Geometries of the kinds that are drawn. */
+  readonly #geometries = new Map<string, BufferGeometry>();
   /** Index: performer. */
   readonly #grips: PropGrip[] = [];
   readonly #material = createPropMaterial();
   readonly #simpleMaterial = new SimplePropMaterial();
   #usesSimpleMaterials = false;
 
-  constructor() {
+  /** `access` is that to the server with the stored props; that of the page by default. */
+  constructor(access?: Access) {
+    this.#models = new PropModels(access);
     this.group.name = "props";
   }
 
@@ -71,17 +70,18 @@ export class PropGroup {
     props: readonly PropPresence[],
     seconds: number,
   ): readonly (StagedPose | null)[] {
+    const drawn = this.#drawable(props);
     return poses.map((pose, performer) => {
       this.#grips[performer] ??= new PropGrip();
-      this.#grips[performer].update(props, performer, seconds);
+      this.#grips[performer].update(drawn, performer, seconds);
       return pose && this.#grips[performer].apply(pose);
     });
   }
 
   /**
    * Show the props that there are now, with the performers in their poses and the floor at `floorHeight`, `seconds`
-   * after the last call; with Infinity nothing eases. Props of unknown kinds, and those whose performer is not seen,
-   * are not drawn. Return true if a kind is drawn for the first time: its shader is to be compiled.
+   * after the last call; with Infinity nothing eases. Props of unknown kinds, those whose model is not loaded, and those
+   * whose performer is not seen are not drawn. Return true if a kind has come: its shader is to be compiled.
    */
   update(
     props: readonly PropPresence[],
@@ -89,15 +89,14 @@ export class PropGroup {
     floorHeight: number,
     seconds: number,
   ): boolean {
-    const kinds = this.#geometries.size;
+    let hasNewKind = false;
     const shown = new Set<string>();
-    for (const prop of props) {
-      const { kind } = prop;
-      if (!isPropKind(kind)) continue;
-      const key = `${prop.prop} ${kind}`;
+    for (const prop of this.#drawable(props)) {
+      const key = `${prop.prop} ${prop.kind}`;
       shown.add(key);
-      const drawn = this.#props.get(key) ?? this.#add(key, kind);
-      const place = transformOf(prop, kind, performers, floorHeight);
+      hasNewKind ||= !this.#geometries.has(prop.kind);
+      const drawn = this.#props.get(key) ?? this.#add(key, prop.kind, prop.shape);
+      const place = transformOf(prop, performers, floorHeight);
       drawn.mesh.visible = place !== null;
       drawn.isHeld = prop.limb !== null;
       if (place) moveMesh(drawn.mesh, drawn.movement.moveTo(place, prop, seconds));
@@ -108,7 +107,8 @@ export class PropGroup {
         mesh.removeFromParent();
         this.#props.delete(key);
       }
-    return this.#geometries.size > kinds;
+    this.#dropUnused(new Set(props.map(({ kind }) => kind)));
+    return hasNewKind;
   }
 
   /** Return the boxes of the props in the picture, in CSS pixels. */
@@ -150,8 +150,16 @@ export class PropGroup {
     return this.#usesSimpleMaterials ? this.#simpleMaterial : this.#material;
   }
 
-  #add(key: string, kind: PropKind): DrawnProp {
-    const mesh = new Mesh<BufferGeometry, Material>(this.#geometryFor(kind), this.#currentMaterial);
+  /** Return the props whose models are there, with these. The others begin to load. */
+  #drawable(props: readonly PropPresence[]): (FormedProp & PropModel)[] {
+    return props.flatMap((prop) => {
+      const model = this.#models.get(prop.kind);
+      return model ? [{ ...prop, ...model }] : [];
+    });
+  }
+
+  #add(key: string, kind: string, shape: PropShape): DrawnProp {
+    const mesh = new Mesh<BufferGeometry, Material>(this.#geometryFor(kind, shape), this.#currentMaterial);
     mesh.name = kind;
     mesh.castShadow = true;
     mesh.receiveShadow = true;
@@ -165,30 +173,38 @@ export class PropGroup {
     return drawn;
   }
 
-  #geometryFor(kind: PropKind): BufferGeometry {
+  #geometryFor(kind: string, { positions, normals, colours, finishes, indices }: PropShape): BufferGeometry {
     const known = this.#geometries.get(kind);
     if (known) return known;
-    const { positions, normals, colours, finishes, indices } = createPropShape(kind);
     const geometry = new BufferGeometry();
     geometry.setAttribute("position", new Float32BufferAttribute(positions, 3));
     geometry.setAttribute("normal", new Float32BufferAttribute(normals, 3));
     geometry.setAttribute("color", new Float32BufferAttribute(colours, 3));
     geometry.setAttribute("finish", new Float32BufferAttribute(finishes, 3));
-    geometry.setIndex(indices);
+    geometry.setIndex(new Uint16BufferAttribute(indices, 1));
     geometry.computeBoundingSphere();
     this.#geometries.set(kind, geometry);
     return geometry;
+  }
+
+  /** Drop what kinds other than these took. */
+  #dropUnused(used: ReadonlySet<string>): void {
+    this.#models.retain(used);
+    for (const [kind, geometry] of this.#geometries)
+      if (!used.has(kind)) {
+        geometry.dispose();
+        this.#geometries.delete(kind);
+      }
   }
 }
 
 /** Return where a prop belongs, null if its performer is not seen. The next call reuses the storage. */
 function transformOf(
-  { limb, place }: PropPresence,
-  kind: PropKind,
+  { form, limb, place }: FormedProp,
   performers: readonly Performer[],
   floorHeight: number,
 ): PropTransform | null {
-  if (limb === null) return laidTransform(kind, place, floorHeight, transform);
+  if (limb === null) return laidTransform(form, place, floorHeight, transform);
   const performer = performers[performerOfLimb(limb)];
   if (!performer?.group.visible) return null;
   const hand = limbWithinPerformer(limb);
@@ -196,7 +212,7 @@ function transformOf(
   position.setFromMatrixPosition(matrix).toArray(grip.position);
   const { x, y, z, w } = rotation.setFromRotationMatrix(matrix);
   grip.rotation.set([w, x, y, z]);
-  return heldTransform(kind, hand, grip, transform);
+  return heldTransform(form, hand, grip, transform);
 }
 
 function moveMesh(mesh: Mesh, place: PropTransform): void {

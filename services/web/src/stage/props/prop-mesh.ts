@@ -1,20 +1,11 @@
 /** Builder of a prop's mesh: solids, and flat faces of paper and petals. */
 import { Color, Vector3 } from "three";
+import type { PropShape } from "../../motion/prop-model";
 import type { Finish } from "../puppet/finish";
 import { orientOutward } from "../puppet/geometry-builder";
 import type { Surface } from "../puppet/surface";
 
-/** Vertices and triangles: three numbers per vertex for each attribute. */
-export interface PropShape {
-  readonly positions: number[];
-  readonly normals: number[];
-  /** Linear RGB. */
-  readonly colours: number[];
-  /** Roughness, metalness and clearcoat. */
-  readonly finishes: number[];
-  readonly indices: number[];
-}
-
+/** Shape that is built of solids and faces. */
 export class PropMesh implements PropShape {
   readonly positions: number[] = [];
   readonly normals: number[] = [];

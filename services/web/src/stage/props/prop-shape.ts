@@ -1,12 +1,13 @@
-/** Shapes of the props by kind. */
+/** Shapes of the built-in props by kind. */
+
 import type { PropKind } from "../../motion/props";
 import { createBall } from "./ball";
 import { createBranch } from "./branch";
 import { createFan } from "./fan";
-import type { PropShape } from "./prop-mesh";
+import type { PropMesh } from "./prop-mesh";
 import { createUmbrella } from "./umbrella";
 
-const CREATORS: Readonly<Record<PropKind, () => PropShape>> = {
+const CREATORS: Readonly<Record<PropKind, () => PropMesh>> = {
   fan: createFan,
   umbrella: createUmbrella,
   ball: createBall,
@@ -14,6 +15,6 @@ const CREATORS: Readonly<Record<PropKind, () => PropShape>> = {
 };
 
 /** Return the shape of a prop in its own frame. */
-export function createPropShape(kind: PropKind): PropShape {
+export function createPropShape(kind: PropKind): PropMesh {
   return CREATORS[kind]();
 }

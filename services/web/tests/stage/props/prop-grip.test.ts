@@ -1,13 +1,18 @@
 import { beforeEach, expect, test } from "vitest";
 import type { StagedPose } from "../../../src/motion/extension";
 import { CHAIN_COUNT, type Hands, MAX_CHAIN_JOINTS, poseHands, WRISTS } from "../../../src/motion/hands";
-import { PROP_KINDS } from "../../../src/motion/props";
+import { PROP_FORMS, PROP_KINDS, type PropKind } from "../../../src/motion/props";
 import { JOINT_COUNT } from "../../../src/motion/skeleton";
-import { PropGrip } from "../../../src/stage/props/prop-grip";
-import type { PropPresence } from "../../../src/wire/messages";
+import { type FormedProp, PropGrip } from "../../../src/stage/props/prop-grip";
 
 const [LEFT_INDEX, RIGHT_INDEX] = [1, 6];
-const held = (limb: number | null, kind = "fan"): PropPresence => ({ prop: 0, kind, limb, place: [0, 0, 0] });
+const held = (limb: number | null, kind: PropKind = "fan"): FormedProp => ({
+  prop: 0,
+  kind,
+  limb,
+  place: [0, 0, 0],
+  form: PROP_FORMS[kind],
+});
 const pose: StagedPose = { root: Float64Array.of(0, 1, 0), rotations: new Float64Array(JOINT_COUNT * 4) };
 /** Hands of a motion that has the first two joints of the left index finger. */
 const motionHands: Hands = {
@@ -30,8 +35,8 @@ function bend({ hands }: StagedPose, chain: number, place: number): number | nul
   return Math.hypot(...hands.values.subarray((start + place) * 3, (start + place) * 3 + 3));
 }
 
-test("nothing changes without props, in hands of others, or with an unknown kind", () => {
-  for (const props of [[], [held(null)], [held(4)], [held(0, "lantern")]]) {
+test("nothing changes without props, or in hands of others", () => {
+  for (const props of [[], [held(null)], [held(4)]]) {
     grip.update(props, 0, Infinity);
     expect(grip.apply(pose)).toBe(pose);
   }
@@ -39,7 +44,7 @@ test("nothing changes without props, in hands of others, or with an unknown kind
 
 test.each(PROP_KINDS)("a hand closes around a %s and opens again, without a jump", (kind) => {
   const bends: number[] = [];
-  const run = (frames: number, props: readonly PropPresence[]) => {
+  const run = (frames: number, props: readonly FormedProp[]) => {
     for (let frame = 0; frame < frames; frame++) {
       grip.update(props, 0, 1 / 60);
       bends.push(bend(grip.apply(pose), LEFT_INDEX, 1) ?? 0);
@@ -82,4 +87,14 @@ test("the motion's fingers move on in the other hand and come back", () => {
   expect(grip.apply(moved).hands?.hands).toBe(closed.hands?.hands);
   grip.update([], 0, Infinity);
   expect(grip.apply(moved)).toBe(moved);
+});
+
+test("fingers lie around what is in the palm, and close around a shaft", () => {
+  const [inPalm, shaft] = [0.01, 0].map((palmOffset) => {
+    const form = { rest: { pitch: 0, height: 0 }, palmOffset };
+    grip.update([{ ...held(0), kind: "abcdefghijklmnopq234", form }], 0, Infinity);
+    return bend(grip.apply(pose), LEFT_INDEX, 1) ?? 0;
+  });
+  expect(inPalm).toBeCloseTo(0.3, 6);
+  expect(shaft).toBeGreaterThan(1);
 });

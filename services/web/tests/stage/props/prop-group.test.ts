@@ -1,11 +1,13 @@
 import { Group, type Matrix4, type Mesh, PerspectiveCamera, Quaternion, Vector3 } from "three";
-import { beforeEach, expect, test } from "vitest";
-import { PROP_RESTS } from "../../../src/motion/props";
+import { afterEach, beforeEach, expect, test, vi } from "vitest";
+import { PROP_FORMS } from "../../../src/motion/props";
+import { JOINT_COUNT } from "../../../src/motion/skeleton";
 import { ScreenProjection } from "../../../src/stage/camera/screen-projection";
 import { PropGroup } from "../../../src/stage/props/prop-group";
 import { SimplePropMaterial } from "../../../src/stage/props/prop-material";
 import type { Performer } from "../../../src/stage/puppet/performer";
 import type { PropPresence } from "../../../src/wire/messages";
+import { EXTRAS, STORED_ID, writePropModel } from "../../prop-model-file";
 
 const FLOOR_M = -0.05;
 const FRAME_S = 1 / 60;
@@ -30,6 +32,8 @@ beforeEach(() => {
   props = new PropGroup();
   [first, second] = [new Hands(new Vector3(0, 1, 0)), new Hands(new Vector3(2, 1.5, 0))];
 });
+
+afterEach(() => void vi.unstubAllGlobals());
 
 function show(seconds: number, ...shown: PropPresence[]): boolean {
   const performers = [first, second] as unknown as Performer[];
@@ -64,7 +68,7 @@ test("a prop appears where it is, and follows the hand", () => {
 
 test("a prop lies on the floor", () => {
   show(FRAME_S, held(null, "umbrella"));
-  expect(positionOf(meshes()[0]).toArray()).toEqual([1, FLOOR_M + PROP_RESTS.umbrella.height, 2]);
+  expect(positionOf(meshes()[0]).toArray()).toEqual([1, FLOOR_M + PROP_FORMS.umbrella.rest.height, 2]);
 });
 
 test.each([
@@ -144,4 +148,36 @@ test("boxes contain the props, and those in hands count for the framing", () => 
     expect(x > box.left && x < box.right && y > box.top && y < box.bottom).toBe(true);
   }
   expect(props.reach(camera)).toBeGreaterThan(0.2);
+});
+
+test("a stored prop is drawn once its model has come, in a hand that closes then, and others are drawn meanwhile", async () => {
+  let resolve: (response: Response) => void = () => undefined;
+  vi.stubGlobal("fetch", () => new Promise((respond) => (resolve = respond)));
+  const shown = [held(0, STORED_ID), held(null, "ball", 1)];
+  const pose = { root: Float64Array.of(0, 1, 0), rotations: new Float64Array(JOINT_COUNT * 4) };
+  show(FRAME_S, ...shown);
+  expect(meshes().map(({ name }) => name)).toEqual(["ball"]);
+  expect(props.closeHands([pose], shown, Infinity)).toEqual([pose]);
+  resolve(new Response(writePropModel()));
+  await expect.poll(() => show(FRAME_S, ...shown)).toBe(true);
+  const [, staff] = meshes();
+  expect(staff.name).toBe(STORED_ID);
+  expect(positionOf(staff).toArray()).toEqual([0.5, 1, 0]);
+  expect(staff.geometry.getAttribute("color").getX(0)).toBe(1);
+  expect(staff.geometry.getAttribute("finish").getX(1)).toBeCloseTo(0.50196, 4);
+  const [closed] = props.closeHands([pose], shown, Infinity);
+  expect(closed?.hands?.hands.counts.some((count) => count > 0)).toBe(true);
+  show(Infinity, held(null, STORED_ID));
+  expect(positionOf(meshes()[0]).y).toBeCloseTo(FLOOR_M + EXTRAS.height, 6);
+});
+
+test("the geometry of a kind is freed with its last prop", () => {
+  const freed: string[] = [];
+  show(FRAME_S, held(0), held(1, "ball", 1), held(4, "fan", 2));
+  for (const { geometry, name } of meshes()) geometry.addEventListener("dispose", () => freed.push(name));
+  show(FRAME_S, held(0));
+  expect(freed).toEqual(["ball"]);
+  show(FRAME_S);
+  expect(freed).toEqual(["ball", "fan", "fan"]);
+  expect(show(FRAME_S, held(0))).toBe(true);
 });

@@ -1,15 +1,16 @@
 import { Vector3 } from "three";
 import { describe, expect, test } from "vitest";
+import type { PropShape } from "../../../src/motion/prop-model";
 import {
   BALL_RADIUS_M,
   createPropTransform,
   laidTransform,
+  PROP_FORMS,
   PROP_KINDS,
   type PropKind,
   UMBRELLA,
 } from "../../../src/motion/props";
 import { rotate } from "../../../src/motion/rotation";
-import type { PropShape } from "../../../src/stage/props/prop-mesh";
 import { createPropShape } from "../../../src/stage/props/prop-shape";
 
 const MAX_TRIANGLES = 1_500;
@@ -48,7 +49,7 @@ describe.each(PROP_KINDS)("the %s", (kind: PropKind) => {
   });
 
   test("rests on the floor", () => {
-    const { position, rotation } = laidTransform(kind, [0, 0, 0.3], 0, createPropTransform());
+    const { position, rotation } = laidTransform(PROP_FORMS[kind], [0, 0, 0.3], 0, createPropTransform());
     const out = new Float64Array(3);
     const heights = corners(shape).map((corner) => {
       rotate(out, 0, rotation, 0, Float64Array.from(corner.toArray()), 0);
