@@ -8,6 +8,7 @@ export type { LivePerformer, PerformerFigure } from "./client/api";
 export { Performer, type PerformerOptions } from "./client/performer";
 export { ProblemError } from "./client/problem";
 export { Puppeteer, type PuppeteerOptions } from "./client/puppeteer";
+export { deleteProp, listProps, type StoredProp, uploadProp } from "./client/stored-props";
 export { type Presence, type Timeline, Viewer, type ViewerOptions, type ViewerStatistics } from "./client/viewer";
 export { DamagedBlock } from "./codec/errors";
 export { decodeMotionBlock, MotionBlock } from "./codec/motion-decoder";

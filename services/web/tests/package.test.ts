@@ -13,8 +13,8 @@ const COMPILER = join(WEB, "node_modules/typescript/bin/tsc");
 
 /** Program that uses the package's types. A missing type would make a `@ts-expect-error` fail. */
 const PROGRAM = `
-import { Access, decodeMotionBlock, JOINTS, MotionTrack, pack, parseStageAddress, Performer } from "bunraku";
-import { Puppeteer, restPose } from "bunraku";
+import { Access, decodeMotionBlock, deleteProp, JOINTS, listProps, MotionTrack, pack, parseStageAddress, Performer } from "bunraku";
+import { Puppeteer, restPose, type StoredProp, uploadProp } from "bunraku";
 import { Stage, unpack, Viewer, type Message, type Placement, type Pose, type StageAddress } from "bunraku";
 import type { StagedPerformer, ThemePreference } from "bunraku";
 import "bunraku/element";
@@ -29,6 +29,11 @@ export async function perform(): Promise<void> {
   const isSent: boolean = performer.frame([0, 0.9, 0], restPose().rotations);
   console.log(isSent, performer.session, performer.motion);
   await performer.close();
+}
+export async function replaceProp(file: File): Promise<StoredProp> {
+  const { items } = await listProps({ limit: 1 }, access);
+  await deleteProp(items[0].id, access);
+  return uploadProp(file, { access, onProgress: (share) => console.log(share.toFixed(2)) });
 }
 const pose: Pose | null = viewer.poseAt(0);
 export const angles: Float64Array = (pose ?? restPose()).rotations;

@@ -3,10 +3,10 @@ import { editSession } from "../client/api";
 import { ProblemError } from "../client/problem";
 import type { PropRefusalReason } from "../engine/prop-request";
 import { type PlainMessageKey, translate } from "../i18n/translator";
-import type { PropKind } from "../motion/props";
 import { limbHolders, limbName } from "../ui/limb-state";
 import type { ShowToast } from "../ui/notification/toast";
 import type { PropActions } from "../ui/strings/prop-section";
+import type { StoredProps } from "../ui/strings/stored-prop-list";
 import { MAX_PROPS } from "../wire/limbs";
 import type { PropPresence } from "../wire/messages";
 import type { RemotePlayback } from "./remote-playback";
@@ -38,32 +38,56 @@ export async function moveNearestProp({ current, moveProp, toast }: PropContext)
 export function createPropActions(context: () => PropContext): PropActions {
   /** Numbers of the props after the last edit of this page: the session may not have told them yet. */
   let known: readonly number[] = [];
-  let lastEdit: Promise<void> = Promise.resolve();
-  const edit = async (props: Record<string, PropKind | null>) => {
+  let lastEdit: Promise<unknown> = Promise.resolve();
+  let stored: Promise<StoredProps> | null = null;
+  /** Edit the session. Return true if it has accepted the edit. */
+  const edit = async (props: Record<string, string | null>): Promise<boolean> => {
     const { current, toast } = context();
-    if (!current) return;
+    if (!current) return false;
     try {
       const session = await editSession(current.id, { props });
       known = numbersOf(session.props);
+      return true;
     } catch (error) {
       known = [];
       toast(error instanceof ProblemError ? translate("{title}: {detail}", error) : String(error));
+      return false;
     }
   };
-  const add = async (kind: PropKind) => {
+  const addNow = async (kind: string): Promise<boolean> => {
     const present = numbersOf(context().current?.presence?.props);
     const findFree = (...used: number[]) => ALL_NUMBERS.find((prop) => !used.includes(prop));
     const free = findFree(...present, ...known) ?? findFree(...present);
-    if (free !== undefined) await edit({ [free]: kind });
+    if (free !== undefined) return edit({ [free]: kind });
+    context().toast(translate("There is room for {count} props", { count: MAX_PROPS }));
+    return false;
+  };
+  /** Add a prop after those before, so that each has its own number. Return true if it is there. */
+  const add = (kind: string): Promise<boolean> => {
+    const added = lastEdit.then(() => addNow(kind));
+    lastEdit = added;
+    return added;
   };
   return {
-    // One after the other, so that each has its own number.
-    add: (kind) => void (lastEdit = lastEdit.then(() => add(kind))),
+    add: (kind) => void add(kind),
     remove: (prop) => void edit({ [prop]: null }),
     async put(prop, limb) {
       const { current, putProp, toast } = context();
       const refusal = await putProp(prop, limb).catch(() => "no answer" as const);
       if (refusal && current) toast(describeRefusal(refusal, limb, current));
+    },
+    stored() {
+      stored ??= import("./prop-library").then(
+        ({ PropLibrary }) =>
+          new PropLibrary({
+            toast: (message) => context().toast(message),
+            bring: add,
+            confirm: (question) => confirm(question),
+          }),
+      );
+      // The next call tries again.
+      stored.catch(() => (stored = null));
+      return stored;
     },
   };
 }

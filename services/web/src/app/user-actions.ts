@@ -12,12 +12,13 @@ import type { EditActions } from "../ui/library/motion-editor";
 import type { CaptureTarget } from "../ui/library/performer-guide";
 import { showProblem } from "../ui/library/problem-report";
 import type { Page, UserActions } from "../ui/page";
+import type { PropActions } from "../ui/strings/prop-section";
 import type { ThemeChoice } from "../ui/theme";
 import { createRecordAction, type KeptMotionActions, showKept } from "../ui/transport/recording";
 import type { AvatarSlots } from "./avatar-slot";
 import { addMotionToStage } from "./cast";
 import type { Exporter } from "./exporter";
-import { findFileKind } from "./file-kind";
+import { type FileKind, findFileKind } from "./file-kind";
 import type { LibraryController } from "./library-controller";
 import type { LimbControls } from "./limb-controls";
 import { createEditedMotion } from "./motion-edit";
@@ -48,6 +49,7 @@ export interface AppParts {
 
 /** Return the actions of the page's buttons, menus and panels, as far as the role of this page allows them. */
 export function createUserActions(app: AppParts): UserActions {
+  const props = pageAccess.allows("control") ? createPropActions(() => propContext(app)) : null;
   return {
     share: () => void copyShareLink(app.playback.current?.id ?? null, app.page.toast),
     language: () => {
@@ -62,7 +64,7 @@ export function createUserActions(app: AppParts): UserActions {
     camera: () => app.stageHost.toggleCamera(),
     sound: () => app.soundController.toggle(),
     volume: (volume) => (app.soundController.volume = volume),
-    files: (files) => void openFiles(app, files),
+    files: (files) => void openFiles(app, files, props),
     avatar: (file) => void app.avatarSlots.selected.load(file),
     danceAs: (avatar) => app.avatarSlots.selected.setActive(avatar),
     removeAvatar: () => void app.avatarSlots.selected.remove(),
@@ -107,7 +109,7 @@ export function createUserActions(app: AppParts): UserActions {
           edits: createEditActions(app),
         }
       : {}),
-    ...(pageAccess.allows("control") ? { props: createPropActions(() => propContext(app)) } : {}),
+    ...(props ? { props } : {}),
     ...(pageAccess.allows("ingest") && pageAccess.allows("control")
       ? {
           add: (motion) => {
@@ -162,13 +164,17 @@ function createCrowdActions(app: AppParts): CrowdActions {
   };
 }
 
-/** Load the last avatar file of these, and upload all motion files if this page may. */
-async function openFiles(app: AppParts, files: readonly File[]): Promise<void> {
+/** Load the last avatar file of these, and upload all files of motions and props if this page may. */
+async function openFiles(app: AppParts, files: readonly File[], props: PropActions | null): Promise<void> {
   const { page, avatarSlots } = app;
   const kinds = await Promise.all(files.map(findFileKind));
   const avatar = files.findLast((_, index) => kinds[index] === "avatar");
   if (avatar) void avatarSlots.selected.load(avatar);
-  const motions = pageAccess.allows("ingest") ? files.filter((_, index) => kinds[index] === "motion") : [];
+  const uploadable = (kind: FileKind) =>
+    pageAccess.allows("ingest") ? files.filter((_, index) => kinds[index] === kind) : [];
+  const models = uploadable("prop");
+  if (props && models.length > 0) void bringProps(app, models, props);
+  const motions = uploadable("motion");
   if (avatar || motions.length > 0) page.panels.open("library");
   if (motions.length === 0) return;
   try {
@@ -176,6 +182,19 @@ async function openFiles(app: AppParts, files: readonly File[]): Promise<void> {
     uploadFiles(uploadTarget(app), motions);
   } catch {
     showProblem(page.library, motions[0].name, ProblemError.unreachable());
+  }
+}
+
+/** Store files as props, and bring them on the stage of the session. */
+async function bringProps({ page, playback }: AppParts, files: readonly File[], props: PropActions): Promise<void> {
+  if (playback.current?.kind !== "sessions") {
+    page.toast(translate("Props need a session: choose a dance from the library first"));
+    return;
+  }
+  try {
+    await (await props.stored()).upload(files);
+  } catch {
+    page.toast(translate("{title}: {detail}", ProblemError.unreachable()));
   }
 }
 

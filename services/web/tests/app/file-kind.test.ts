@@ -16,14 +16,19 @@ test.for([
   [new File([], "walk.vrm.bvh"), "motion"],
   [new File([], "aiko.VRM"), "avatar"],
   [glb('{"animations": [{}], "meshes": [{}]}'), "motion"],
-  [glb('{"animations": []}'), "avatar"],
-  [glb("{}"), "avatar"],
+  [glb('{"animations": [{}], "skins": [{}]}'), "motion"],
+  [glb('{"animations": [], "skins": [{}]}'), "avatar"],
+  [glb('{"extensions": {"VRMC_vrm": {}}}'), "avatar"],
+  [glb('{"extensions": {"VRM": {}}}'), "avatar"],
+  [glb('{"animations": [], "skins": [], "meshes": [{}]}'), "prop"],
+  [glb('{"extensions": {"KHR_xmp_json_ld": {}}}'), "prop"],
+  [glb("{}"), "prop"],
   [glb("null"), "avatar"],
   [glb("{", 1 << 30), "avatar"],
   [glb("{broken"), "avatar"],
   [new File(["x"], "short.glb"), "avatar"],
   [new File(['{"animations": [{}]}'], "walk.gltf"), "motion"],
-  [new File(["{}"], "aiko.gltf"), "avatar"],
+  [new File(["{}"], "sword.gltf"), "prop"],
 ] as const)("file %# is taken as what it is", async ([file, kind]) => {
   expect(await findFileKind(file)).toBe(kind);
 });

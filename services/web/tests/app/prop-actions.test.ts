@@ -3,6 +3,8 @@ import { createPropActions, moveNearestProp, type PropContext } from "../../src/
 import { RemotePlayback } from "../../src/app/remote-playback";
 import type { PropRefusalReason } from "../../src/engine/prop-request";
 import type { Presence, PropPresence } from "../../src/wire/messages";
+import { FakeRequest } from "../client/fake-request";
+import { STORED_ID } from "../prop-model-file";
 
 let playback: RemotePlayback | null;
 let requests: unknown[];
@@ -18,7 +20,7 @@ beforeEach(() => {
   answer = () => Promise.resolve(null);
   respond = () => Response.json({});
   vi.stubGlobal("fetch", (path: string, { method, body }: RequestInit) => {
-    requests.push([`${method} ${path}`, JSON.parse(String(body))]);
+    requests.push([`${method} ${path}`, body === undefined ? null : JSON.parse(String(body))]);
     return Promise.resolve(respond());
   });
 });
@@ -94,6 +96,23 @@ test("without a free number, or without a session, nothing is sent", async () =>
   remove(1);
   await handleAll();
   expect(requests).toEqual([]);
+  expect(toasts).toEqual(["There is room for 8 props"]);
+});
+
+test("the stored props are loaded once, and bring props on the stage", async () => {
+  show([0]);
+  const { stored } = createPropActions(context);
+  const props = await stored();
+  expect(await stored()).toBe(props);
+  expect(requests).toEqual([]);
+  vi.stubGlobal("XMLHttpRequest", FakeRequest);
+  const uploaded = props.upload([new File([], "sword.glb")]);
+  await expect.poll(() => props.uploadShare).toBe(0);
+  respond = () => Response.json({ items: [] });
+  FakeRequest.last.respond(201, JSON.stringify({ id: STORED_ID, name: "sword", guessed: [] }));
+  await uploaded;
+  expect(requests[0]).toEqual(["PATCH /v1/sessions/s%201", { props: { "1": STORED_ID } }]);
+  expect(toasts).toEqual(["sword is on the stage."]);
 });
 
 test("a prop is removed by its number, and a rejection is shown", async () => {

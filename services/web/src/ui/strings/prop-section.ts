@@ -6,12 +6,16 @@ import type { PropPresence } from "../../wire/messages";
 import { element, setText } from "../dom";
 import { icon } from "../icon";
 import { LIMB_ORDER, limbName } from "../limb-state";
+import { createStoredPropList, type StoredPropList, type StoredProps } from "./stored-prop-list";
 
 export interface PropActions {
-  add(kind: PropKind): void;
+  /** Add a prop: of a built-in kind, or of a stored one by its id. */
+  add(kind: string): void;
   remove(prop: number): void;
   /** Put a prop into the hand of this number, or lay it down (null). Resolves when it is there or stays. */
   put(prop: number, limb: number | null): Promise<void>;
+  /** Load the stored props. Rejects if their code cannot be loaded. */
+  stored(): Promise<StoredProps>;
 }
 
 export interface PropSection {
@@ -41,7 +45,8 @@ interface PlaceOption {
 }
 
 /** Create the section, closed at first. */
-export function createPropSection(actions: PropActions, { translate } = pageTranslator): PropSection {
+export function createPropSection(actions: PropActions, translator = pageTranslator): PropSection {
+  const { translate } = translator;
   const rows = new Map<number, PropRow>();
   const list = element("ul", { class: "prop-list" });
   const count = element("span", { class: "muted" });
@@ -64,33 +69,57 @@ export function createPropSection(actions: PropActions, { translate } = pageTran
     element("div", { class: "prop-adders", role: "group", "aria-label": translate("Add a prop") }, ...adders),
     full,
   );
-  section.addEventListener("toggle", () => section.open && section.scrollIntoView({ block: "nearest" }));
+  /** Null until the section is opened. */
+  let stored: StoredProps | null = null;
+  let storedList: StoredPropList | null = null;
+  let renderAgain = () => {};
+  const showStored = async (loaded: StoredProps) => {
+    if (stored !== loaded) {
+      stored = loaded;
+      storedList = createStoredPropList(loaded, actions.add, translator);
+      full.before(storedList.element);
+      loaded.onChange = () => renderAgain();
+    }
+    await loaded.refresh();
+    showSection();
+  };
+  const showSection = () => section.open && section.scrollIntoView({ block: "nearest" });
+  section.addEventListener("toggle", () => {
+    if (!section.open) return;
+    showSection();
+    // If they cannot be loaded, the next opening tries again.
+    actions.stored().then(showStored, () => undefined);
+  });
   const removeRow = (prop: number, row: PropRow) => {
     const hadFocus = row.element.contains(document.activeElement);
     row.element.remove();
     rows.delete(prop);
     if (hadFocus) section.querySelector<HTMLElement>("summary")?.focus();
   };
-  return {
-    element: section,
-    render(props, performers, ready) {
-      setText(count, props.length > 0 ? String(props.length) : "");
-      for (const [prop, row] of [...rows]) if (!props.some((one) => one.prop === prop)) removeRow(prop, row);
-      const sorted = [...props].sort((a, b) => a.prop - b.prop);
-      for (const prop of sorted) {
-        let row = rows.get(prop.prop);
-        if (!row) {
-          row = createRow(prop.prop, actions, translate);
-          rows.set(prop.prop, row);
-          list.append(row.element);
-        }
-        row.render(prop, propName(prop, sorted, translate), placeOptions(prop, props, performers, translate), ready);
+  const render: PropSection["render"] = (props, performers, ready) => {
+    renderAgain = () => render(props, performers, ready);
+    const nameOf = ({ prop, kind }: PropPresence) =>
+      isPropKind(kind)
+        ? translate(KIND_NAMES[kind])
+        : (stored?.nameOf(kind) ?? translate("Prop {number}", { number: prop + 1 }));
+    setText(count, props.length > 0 ? String(props.length) : "");
+    for (const [prop, row] of [...rows]) if (!props.some((one) => one.prop === prop)) removeRow(prop, row);
+    const sorted = [...props].sort((a, b) => a.prop - b.prop);
+    for (const prop of sorted) {
+      let row = rows.get(prop.prop);
+      if (!row) {
+        row = createRow(prop.prop, actions, translate);
+        rows.set(prop.prop, row);
+        list.append(row.element);
       }
-      const hasRoom = props.length < MAX_PROPS;
-      for (const adder of adders) adder.disabled = !ready || !hasRoom;
-      full.hidden = hasRoom;
-    },
+      row.render(prop, propName(prop, sorted, nameOf), placeOptions(prop, props, performers, translate), ready);
+    }
+    const hasRoom = props.length < MAX_PROPS;
+    for (const adder of adders) adder.disabled = !ready || !hasRoom;
+    storedList?.render(ready, hasRoom);
+    full.hidden = hasRoom;
   };
+  return { element: section, render };
 }
 
 type Translate = typeof pageTranslator.translate;
@@ -137,12 +166,11 @@ function createRow(prop: number, actions: PropActions, translate: Translate): Pr
   };
 }
 
-/** Name a prop, with a number if there are others of its kind. */
-function propName({ prop, kind }: PropPresence, props: readonly PropPresence[], translate: Translate): string {
-  // A kind that this page does not know can be removed all the same.
-  const name = isPropKind(kind) ? translate(KIND_NAMES[kind]) : kind;
-  const same = props.filter((other) => other.kind === kind);
-  return same.length > 1 ? `${name} ${same.findIndex((other) => other.prop === prop) + 1}` : name;
+/** Name a prop, with a number if there are others of its name. */
+function propName(prop: PropPresence, props: readonly PropPresence[], nameOf: (prop: PropPresence) => string): string {
+  const name = nameOf(prop);
+  const same = props.filter((other) => nameOf(other) === name);
+  return same.length > 1 ? `${name} ${same.indexOf(prop) + 1}` : name;
 }
 
 /** Return the places where a prop can be: the floor, and all hands in the order of their keys. */
