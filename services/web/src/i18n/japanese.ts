@@ -597,6 +597,22 @@ export const JAPANESE_SERVER_MESSAGES: Readonly<Record<string, string>> = {
   "the {limb} was asked to a place out of reach and goes as near as it can":
     "{limb}が届かない位置です。届くところまで動かします",
   "the {limb} is not yours: an input for it was refused": "{limb}はあなたが持っていないため、動かせません",
+  "Its {size} units seem to be {unit}: it is {length} m long.":
+    "大きさの{size}は{unit}とみなし、長さ{length} mにしました。",
+  "Its unit is unknown, it has {size} of them: it is made {length} m long.":
+    "大きさ{size}の単位が分からないため、長さ{length} mにしました。",
+  "Its origin is outside of it: it is held at its middle.": "原点が小道具の外にあるため、中央を持ちます。",
+  centimetres: "センチメートル",
+  millimetres: "ミリメートル",
+  inches: "インチ",
+  "No surface": "面がありません",
+  "the file has no triangles that can be seen": "見える三角形がありません",
+  "Too many triangles": "三角形が多すぎます",
+  "a prop may have {count} triangles, both sides of sheets counted":
+    "小道具の三角形は{count}個までです（薄い面は両面を数えます）",
+  "Unsupported extension": "対応していない拡張です",
+  "the file requires {extension}": "{extension}が必要なファイルです",
+  "No such prop": "その小道具は見つかりません",
   "left hand": "左手",
   "right hand": "右手",
   "left leg": "左足",

@@ -18,7 +18,8 @@ const DEFERRED_FILES = [
   /extension-/,
   /\/hands-/,
   /planted-feet-/,
-  /prop-group-/,
+  /prop-(group|library|models|movement)-/,
+  /stored-props-/,
   // what extensions share with exports, and the props on the stage with their controls
   /prop-store-/,
   /\/props-/,

@@ -5,6 +5,7 @@ import { expect, test } from "vitest";
 import { findViolations } from "./accessibility";
 import { dropBytes } from "./avatar-drop";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
+import { createEmbeddingPage, waitForStages } from "./embedding-page";
 import { evaluateInEngine, waitInEngine } from "./engine-probe";
 import { pauseAtStart, stopDrawing, waitForDraw, waitForFirstPose, waitForToast, waitForWelcome } from "./page-probe";
 import { createStaffGlb } from "./staff-file";
@@ -154,6 +155,25 @@ describeInBrowser("stored props with access control", { server: "guarded" }, (fi
     await page.getByRole("button", { name: "Add: mast", exact: true }).click();
     await waitInEngine(page, heightsOfProp, id);
     expect(await page.locator(".stored-props button").count()).toBe(await page.locator(".stored-props li").count());
+  });
+
+  test("an embedded stage of another site draws them, with a link to the session alone", async () => {
+    const { id } = await fixture.request<{ id: string }>(
+      "POST",
+      "/v1/props?filename=spear.glb",
+      new Uint8Array(createStaffGlb(0.5)),
+    );
+    await fixture.request("PATCH", `/v1/sessions/${fixture.session}`, { props: { "0": id } });
+    const { link } = await fixture.request<{ link: string }>("POST", "/v1/shares", { session: fixture.session });
+    const stage = `<bunraku-stage src="${fixture.url}${link}" style="width: 300px"></bunraku-stage>`;
+    const page = await fixture.open(
+      fixture.site.origin + (await fixture.publish(createEmbeddingPage(stage, fixture.url))),
+    );
+    await waitForStages(page);
+    await page.waitForFunction(
+      (id) => document.querySelector("bunraku-stage")?.stage?.scene.getObjectByName(id)?.visible,
+      id,
+    );
   });
 });
 
