@@ -76,6 +76,7 @@ export class PropLibrary implements StoredProps {
       this.host.toast(translate("{name} is too large: a prop has at most {count} MB", { name: file.name, count: 16 }));
       return;
     }
+    this.host.toast(translate("Uploading {name}", { name: file.name }));
     this.#showProgress(0);
     try {
       const { id, name, guessed } = await uploadProp(file, { onProgress: (share) => this.#showProgress(share) });

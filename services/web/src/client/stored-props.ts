@@ -19,6 +19,9 @@ export interface StoredProp {
   guessed: string[];
 }
 
+/** Longest time without data while a model is fetched. */
+const STALL_TIMEOUT_MS = 30_000;
+
 /** List stored props, newest first, at most `limit`. */
 export function listProps(
   { limit, cursor }: { readonly limit?: number; readonly cursor?: string } = {},
@@ -47,13 +50,32 @@ export async function deleteProp(id: string, access: Access = pageAccess): Promi
   await requestJson("DELETE", pathOf(id), undefined, access);
 }
 
-/** Fetch the model of a stored prop, a GLB file that the server has made. Rejects with ProblemError. */
-export async function fetchPropModel(id: string, access: Access, signal: AbortSignal): Promise<ArrayBuffer> {
-  const response = await access.request(`${access.server}${pathOf(id)}/model`, { signal });
+/**
+ * Fetch the model of a stored prop, a GLB file that the server has made. Rejects with ProblemError, also if nothing
+ * arrives for some time: on a constrained link, the whole may take minutes.
+ */
+export async function fetchPropModel(id: string, access: Access): Promise<ArrayBuffer> {
+  const stalled = new AbortController();
+  const startTimer = () => setTimeout(() => stalled.abort(), STALL_TIMEOUT_MS);
+  let timer = startTimer();
+  const watch = new TransformStream<Uint8Array<ArrayBuffer>, Uint8Array<ArrayBuffer>>({
+    transform(chunk, controller) {
+      clearTimeout(timer);
+      timer = startTimer();
+      controller.enqueue(chunk);
+    },
+  });
   try {
-    return await response.arrayBuffer();
-  } catch {
-    throw ProblemError.unreachable(access.translator);
+    // The motion is more urgent.
+    const { body } = await access.request(`${access.server}${pathOf(id)}/model`, {
+      priority: "low",
+      signal: stalled.signal,
+    });
+    return await new Response(body?.pipeThrough(watch) ?? null).arrayBuffer();
+  } catch (error) {
+    throw error instanceof ProblemError ? error : ProblemError.unreachable(access.translator);
+  } finally {
+    clearTimeout(timer);
   }
 }
 

@@ -378,6 +378,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Stored props": "保存した小道具",
   "From a file…": "ファイルから…",
   "Uploading, {percent}": "アップロード中 {percent}",
+  "Uploading {name}": "{name}をアップロードしています",
   "{prop} is on the stage.": "{prop}を舞台に置きました。",
   "Delete from the server: {prop}": "サーバーから削除：{prop}",
   'Delete "{name}" from the server, for everybody?': "「{name}」をサーバーから削除しますか？全員から見えなくなります。",

@@ -112,7 +112,7 @@ test("the stored props are loaded once, and bring props on the stage", async () 
   FakeRequest.last.respond(201, JSON.stringify({ id: STORED_ID, name: "sword", guessed: [] }));
   await uploaded;
   expect(requests[0]).toEqual(["PATCH /v1/sessions/s%201", { props: { "1": STORED_ID } }]);
-  expect(toasts).toEqual(["sword is on the stage."]);
+  expect(toasts).toEqual(["Uploading sword.glb", "sword is on the stage."]);
 });
 
 test("a prop is removed by its number, and a rejection is shown", async () => {

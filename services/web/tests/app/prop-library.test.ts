@@ -91,7 +91,12 @@ test("files are stored one after the other, with their progress, and brought on 
   FakeRequest.last.respond(200, JSON.stringify(sword));
   await uploaded;
   expect(brought).toEqual([STORED_ID, STORED_ID]);
-  expect(toasts).toEqual(["sword is on the stage. The file seems to be in centimetres.", "sword is on the stage."]);
+  expect(toasts).toEqual([
+    "Uploading sword.glb",
+    "sword is on the stage. The file seems to be in centimetres.",
+    "Uploading sword.glb",
+    "sword is on the stage.",
+  ]);
   expect(shares).toEqual([0, 0.5, null, null, 0, null, null]);
   expect(library.items).toEqual([sword]);
 });
@@ -106,7 +111,12 @@ test("a file that is refused or too large does not stop the next", async () => {
   hasRoom = false;
   FakeRequest.last.respond(201, JSON.stringify(sword));
   await uploaded;
-  expect(toasts).toEqual(["castle.glb is too large: a prop has at most 16 MB", "Not a prop: it has no mesh"]);
+  expect(toasts).toEqual([
+    "castle.glb is too large: a prop has at most 16 MB",
+    "Uploading sword.glb",
+    "Not a prop: it has no mesh",
+    "Uploading sword.glb",
+  ]);
   expect(library.uploadShare).toBeNull();
 });
 

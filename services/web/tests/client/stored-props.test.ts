@@ -17,7 +17,10 @@ beforeEach(() => {
     return Promise.resolve(respond());
   });
 });
-afterEach(() => void vi.unstubAllGlobals());
+afterEach(() => {
+  vi.unstubAllGlobals();
+  vi.useRealTimers();
+});
 
 test("props are listed page by page, described and deleted", async () => {
   expect(await listProps({ limit: 24 })).toEqual({ items: [{ id: STORED_ID }], next: null });
@@ -48,9 +51,31 @@ test("a file is uploaded under its name", async () => {
 
 test("a model is fetched as bytes; an answer that breaks off is a problem", async () => {
   respond = () => new Response(Uint8Array.of(1, 2, 3));
-  const { signal } = new AbortController();
-  expect(new Uint8Array(await fetchPropModel(STORED_ID, access, signal))).toEqual(Uint8Array.of(1, 2, 3));
+  expect(new Uint8Array(await fetchPropModel(STORED_ID, access))).toEqual(Uint8Array.of(1, 2, 3));
   expect(requests).toEqual([`GET https://stage.example/v1/props/${STORED_ID}/model`]);
   respond = () => new Response(new ReadableStream({ pull: (stream) => stream.error(new Error("reset")) }));
-  await expect(fetchPropModel(STORED_ID, access, signal)).rejects.toMatchObject({ name: "ProblemError", status: 0 });
+  await expect(fetchPropModel(STORED_ID, access)).rejects.toMatchObject({ name: "ProblemError", status: 0 });
+});
+
+test("a model may take long, but not stall", async () => {
+  vi.useFakeTimers();
+  let stream: ReadableStreamDefaultController | null = null;
+  vi.stubGlobal("fetch", (_: string, { signal }: RequestInit) => {
+    const body = new ReadableStream({ start: (controller) => void (stream = controller) });
+    signal?.addEventListener("abort", () => stream?.error(signal.reason));
+    return Promise.resolve(new Response(body));
+  });
+  const send = async () => {
+    await vi.advanceTimersByTimeAsync(29_000);
+    stream?.enqueue(Uint8Array.of(7));
+  };
+  const whole = fetchPropModel(STORED_ID, access);
+  for (let chunk = 0; chunk < 3; chunk++) await send();
+  stream!.close();
+  expect((await whole).byteLength).toBe(3);
+  const stalled = fetchPropModel(STORED_ID, access).catch((error: unknown) => error);
+  await send();
+  await vi.advanceTimersByTimeAsync(31_000);
+  expect(await stalled).toMatchObject({ name: "ProblemError", status: 0 });
+  expect(vi.getTimerCount()).toBe(0);
 });

@@ -9,7 +9,6 @@ import { createPropShape } from "./prop-shape";
 
 /** Models that are kept. Of those that are not used, the oldest are dropped. */
 const MAX_MODELS = 16;
-const FETCH_TIMEOUT_MS = 30_000;
 /** Requests for one model, and the time before the second one; each further one waits twice as long. */
 const MAX_ATTEMPTS = 4;
 const FIRST_RETRY_MS = 1_000;
@@ -87,7 +86,7 @@ function createEntry(model: PropModel | null, loaded = Promise.resolve(model)): 
 async function loadStoredModel(id: string, access: Access): Promise<PropModel | null> {
   for (let attempt = 1; ; attempt++) {
     try {
-      return readPropModel(await fetchPropModel(id, access, AbortSignal.timeout(FETCH_TIMEOUT_MS)));
+      return readPropModel(await fetchPropModel(id, access));
     } catch (error) {
       if (error instanceof PropFileError) {
         console.warn(`The prop ${id} is not shown. ${error.message}`);

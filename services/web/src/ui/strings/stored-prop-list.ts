@@ -115,7 +115,7 @@ export function createStoredPropList(
       if (order.some((chip, at) => list.children[at] !== chip)) list.append(...order);
       list.hidden = order.length === 0;
       const { uploadShare } = stored;
-      setAttribute(upload, "aria-busy", uploadShare !== null);
+      setAttribute(upload, "aria-busy", uploadShare === null ? null : "true");
       setText(
         label,
         uploadShare === null
