@@ -106,6 +106,8 @@ export class PropLibrary implements StoredProps {
   }
 
   #report(error: unknown): void {
-    this.host.toast(error instanceof ProblemError ? translate("{title}: {detail}", error) : String(error));
+    if (!(error instanceof ProblemError)) this.host.toast(String(error));
+    else if (error.hint === null) this.host.toast(translate("{title}: {detail}", error));
+    else this.host.toast(translate("{title}: {detail}; {hint}", { ...error, hint: error.hint }));
   }
 }

@@ -378,6 +378,7 @@ export const JAPANESE_PAGE_MESSAGES = {
   "Stored props": "保存した小道具",
   "From a file…": "ファイルから…",
   "Uploading, {percent}": "アップロード中 {percent}",
+  "{title}: {detail}; {hint}": "{title}：{detail}。{hint}",
   "Uploading {name}": "{name}をアップロードしています",
   "{prop} is on the stage.": "{prop}を舞台に置きました。",
   "Delete from the server: {prop}": "サーバーから削除：{prop}",

@@ -106,7 +106,7 @@ test("a file that is refused or too large does not stop the next", async () => {
   const uploaded = library.upload([large, file, file]);
   await expect.poll(() => library.uploadShare).toBe(0);
   const refused = FakeRequest.last;
-  refused.respond(422, '{"title": "Not a prop", "detail": "it has no mesh"}');
+  refused.respond(422, '{"title": "Not a prop", "detail": "it has no mesh", "hint": "export it with one"}');
   await expect.poll(() => FakeRequest.last === refused).toBe(false);
   hasRoom = false;
   FakeRequest.last.respond(201, JSON.stringify(sword));
@@ -114,7 +114,7 @@ test("a file that is refused or too large does not stop the next", async () => {
   expect(toasts).toEqual([
     "castle.glb is too large: a prop has at most 16 MB",
     "Uploading sword.glb",
-    "Not a prop: it has no mesh",
+    "Not a prop: it has no mesh; export it with one",
     "Uploading sword.glb",
   ]);
   expect(library.uploadShare).toBeNull();

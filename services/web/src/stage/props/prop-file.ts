@@ -1,6 +1,6 @@
 /**
- * Reader of the models that the server makes of uploaded props: glTF 2.0 with one mesh of one primitive, and with the
- * form of the prop in the `extras` of its only node. Anything else is rejected.
+ * Reader of the models that the server makes of uploaded props (`proto/playback.md`, 4.12): glTF 2.0 with one mesh of
+ * one primitive, and with the form of the prop in the `extras` of its only node. Anything else is rejected.
  */
 import type { PropModel } from "../../motion/prop-model";
 import type { PropForm } from "../../motion/props";
@@ -12,7 +12,7 @@ export class PropFileError extends Error {
 
 /** Limits of a model: size of the file, vertices, triangles, and distance of anything from the grip. */
 const MAX_BYTES = 4 << 20;
-const MAX_VERTICES = 30_000;
+const MAX_VERTICES = 0xffff;
 const MAX_TRIANGLES = 20_000;
 const MAX_EXTENT_M = 100;
 

@@ -16,8 +16,9 @@ export interface ToastController extends ShowToast {
   showDisconnected(message: string | null): void;
 }
 
-/** Durations without and with actions, which take time to read and to reach. */
+/** Shortest duration, time for each character of a long text, and duration with actions, which take time to reach. */
 const TOAST_DURATION_MS = 3_200;
+const READING_MS_PER_CHARACTER = 60;
 const ACTION_TOAST_DURATION_MS = 8_000;
 
 export function createToast(root: HTMLElement): ToastController {
@@ -39,7 +40,8 @@ export function createToast(root: HTMLElement): ToastController {
       toast.append(button);
     }
     setMessage("toast", toast);
-    timer = setTimeout(clear, actions.length > 0 ? ACTION_TOAST_DURATION_MS : TOAST_DURATION_MS);
+    const minimum = actions.length > 0 ? ACTION_TOAST_DURATION_MS : TOAST_DURATION_MS;
+    timer = setTimeout(clear, Math.max(minimum, message.length * READING_MS_PER_CHARACTER));
   };
   return Object.assign(show, {
     showDisconnected: (message: string | null) =>

@@ -68,7 +68,7 @@ describe("a file is rejected", () => {
     ["another component type", (json) => (json.accessors[4]["componentType"] = 5125)],
     ["colours that are not normalised", (json) => delete json.accessors[2]["normalized"]],
     ["sparse positions", (json) => (json.accessors[0]["sparse"] = {})],
-    ["too many vertices", (json) => (json.accessors[0]["count"] = 30_001)],
+    ["too many vertices", (json) => (json.accessors[0]["count"] = 0x10000)],
     ["fewer normals than vertices", (json) => (json.accessors[1]["count"] = 3)],
     ["a fraction of an index", (json) => (json.accessors[4]["count"] = 2.5)],
     ["half a triangle", (json) => (json.accessors[4]["count"] = 5)],
