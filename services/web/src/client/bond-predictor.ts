@@ -1,4 +1,4 @@
-/** Predictions of all bonds of this page's hands. Their code is loaded with the first hand. */
+/** Predictions of all bonds of this page's hands. Their code is loaded with the second hand, or the first bond. */
 
 import { performerOfLimb } from "../wire/limbs";
 import type { LimbPair } from "./bond-requests";

@@ -288,7 +288,9 @@ export class Puppeteer extends EventTarget implements LimbPredictor {
     }
     hold.holder = this.id;
     hold.grant(epoch, this.now());
-    if (isHand(limb)) this.bondPredictor.load();
+    // Two hands can be joined at any moment.
+    if (this.limbHolds.filter((other) => isHand(other.limb) && other.state === "granted").length > 1)
+      this.bondPredictor.load();
     this.sendInput(hold, this.now());
     for (const [first, other] of this.bondRequests.takeLost(limb, this.limbHolds, this.now()))
       this.connection.send({ name: "Bond", limbs: [first, other], wanted: true });

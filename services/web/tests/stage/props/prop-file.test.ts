@@ -1,6 +1,8 @@
 import fc from "fast-check";
 import { describe, expect, test } from "vitest";
 import { PropFileError, readPropModel } from "../../../src/stage/props/prop-file";
+import { propVectors } from "../../golden-props";
+import { decodeBase64 } from "../../golden-vectors";
 import { joinChunks, type ModelJson, writePropModel } from "../../prop-model-file";
 
 const closeTo = (values: readonly number[]) => values.map((value) => expect.closeTo(value, 4));
@@ -13,6 +15,17 @@ test("a model has its vertices, triangles and form", () => {
   expect([...Array.from(shape.colours)]).toEqual(closeTo([1, 0, 0, 0, 1, 0, 0, 0, 1, 0.50001, 0.50001, 0.50001]));
   expect([...Array.from(shape.finishes)]).toEqual(closeTo([1, 0, 0, 0.50196, 0, 0, 0.2, 1, 0, 0.2, 0, 1]));
   expect([...Array.from(shape.indices)]).toEqual([0, 1, 2, 1, 3, 2]);
+});
+
+test("models of the server have the recorded values", () => {
+  const { models } = propVectors();
+  expect(models.map(({ name }) => name)).toEqual(["staff", "crate"]);
+  for (const golden of models) {
+    const { form, shape } = readPropModel(decodeBase64(golden.model).slice().buffer);
+    expect(form).toEqual({ rest: { pitch: golden.pitch, height: golden.height }, palmOffset: golden.palmOffset });
+    for (const name of ["positions", "normals", "colours", "finishes", "indices"] as const)
+      expect(Array.from(shape[name]), `${name} of the ${golden.name}`).toEqual(golden[name].map(Math.fround));
+  }
 });
 
 test("attributes may have views of their own, without a stride", () => {
