@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bunraku.motion.rotation import Array
-from bunraku.props.detail import refine
+from bunraku.props.detail import CONTRAST, refine
 from bunraku.props.material import Material, TextureUse
 from bunraku.props.surface import Surface
 from bunraku.props.texture import Texture
@@ -43,6 +43,32 @@ def test_divided_triangles_cover_the_same_area_in_the_same_sense() -> None:
     a, b, c = (divided.positions[divided.triangles[:, at]] for at in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0.0).all()
     assert np.linalg.norm(divided.corners[:, 3:6], axis=1) == pytest.approx(1.0)
+
+
+def test_no_triangle_gets_thin_and_no_edge_hides_a_contrast() -> None:
+    divided = refine(square(disc()), 1 / 64, 4_000)
+    sides = np.stack([divided.positions[divided.triangles[:, at]] for at in (1, 2, 0)], axis=1)
+    sides = sides - divided.positions[divided.triangles]
+    lengths = np.linalg.norm(sides, axis=2)
+    height = np.cross(sides[:, 0], sides[:, 1])[:, 2] / lengths.max(axis=1)
+    assert (height / lengths.max(axis=1)).min() > 0.2
+    # along long edges the texture is what is shown
+    ends = np.concatenate([divided.triangles, np.roll(divided.triangles, -1, axis=1)]).reshape(2, -1).T
+    long = ends[np.linalg.norm(divided.positions[ends[:, 0]] - divided.positions[ends[:, 1]], axis=1) > 1.01 / 64]
+    start, end = divided.corners[long[:, 0]], divided.corners[long[:, 1]]
+    shown = (divided.colours_at(start) + divided.colours_at(end)) / 2.0
+    assert np.abs(divided.colours_at((start + end) / 2.0) - shown).max() <= CONTRAST
+
+
+def test_borders_between_triangles_stay_closed() -> None:
+    divided = refine(square(disc()), 1 / 64, 2_000)
+    edges = np.vstack([divided.triangles[:, [at, (at + 1) % 3]] for at in range(3)])
+    there = {(int(a), int(b)) for a, b in edges}
+    open_edges = [edge for edge in there if edge[::-1] not in there]
+    assert len(there) == len(edges)
+    for edge in open_edges:
+        first, second = divided.positions[list(edge)]
+        assert any(first[axis] == second[axis] in (0.0, 1.0) for axis in (0, 1))
 
 
 def test_division_brings_the_colours_near_the_texture() -> None:
