@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse
 from bunraku.http.access_control import Role, access_of, requires
 from bunraku.http.immutable_resource import immutable_headers, not_modified
 from bunraku.ingest.labels import require_ownership
+from bunraku.ingest.props.model_cache import ModelCache
 from bunraku.ingest.props.operation import PropFit, PropOperation, create_prop_job, prop_json
 from bunraku.ingest.upload import UPLOAD_NAME_PATTERN, UploadReceiver
 from bunraku.props.model_file import MEDIA_TYPE
@@ -27,6 +28,8 @@ MODEL_VERSION = 1
 
 def add_prop_routes(app: FastAPI, context: ServiceContext, operation: PropOperation, uploads: UploadReceiver) -> None:
     """Add the routes of props to the ingest service."""
+
+    models = ModelCache(context.catalogue.get_prop_model)
 
     async def find(prop: str) -> StoredProp:
         found = await context.catalogue.get_prop(prop)
@@ -93,13 +96,11 @@ def add_prop_routes(app: FastAPI, context: ServiceContext, operation: PropOperat
     ) -> Response:
         """Return the model of a prop as a GLB file of one mesh, with the colours of its corners."""
         etag = f'"{prop}-{MODEL_VERSION}"'
-        if if_none_match is not None:
-            await find(prop)
-            if (unchanged := not_modified(if_none_match, etag)) is not None:
-                return unchanged
-        packed = await context.catalogue.get_prop_model(prop)
+        packed = await models.get(prop)
         if packed is None:
             raise _prop_not_found(prop)
+        if (unchanged := not_modified(if_none_match, etag)) is not None:
+            return unchanged
         headers = {**immutable_headers(etag), "Vary": "Accept-Encoding"}
         if "gzip" in accept_encoding:
             return Response(packed, headers={**headers, "Content-Encoding": "gzip"}, media_type=MEDIA_TYPE)
@@ -110,7 +111,9 @@ def add_prop_routes(app: FastAPI, context: ServiceContext, operation: PropOperat
     async def remove(prop: str, request: Request) -> None:
         """Remove a prop: sessions and recordings no longer show it. Without the role admin, only one's own."""
         require_ownership(access_of(request), await find(prop), "removing")
-        if not await context.catalogue.remove_prop(prop):
+        is_removed = await context.catalogue.remove_prop(prop)
+        models.forget(prop)
+        if not is_removed:
             raise _prop_not_found(prop)
 
 
