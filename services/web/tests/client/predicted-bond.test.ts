@@ -50,9 +50,9 @@ class PlayedStage {
   /** Draw a frame with the overlays up to `received`; return the shown poses of all performers. */
   async draw(frame: number, received = frame): Promise<Pose[]> {
     advanceTime(FRAME_MS);
-    // the code of the prediction is loaded with the first granted hand
-    await vi.dynamicImportSettled();
     for (const event of this.played.events) if (event[0] === frame) this.act(event);
+    // the code of the prediction is loaded with the second granted hand, or the first bond
+    await vi.dynamicImportSettled();
     const frames = this.stage.frames(frame, now, received);
     for (const each of frames) puppeteer.applyOwnLimbs(each);
     const before = this.shown;
