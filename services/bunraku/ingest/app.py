@@ -38,7 +38,7 @@ from bunraku.ingest.reencoding import ReencodingOperation
 from bunraku.ingest.scene import SceneOperation
 from bunraku.ingest.takes import TakesOperation, create_takes_job
 from bunraku.ingest.thumbnail import CONTENT_SECURITY_POLICY, Thumbnails
-from bunraku.ingest.upload import UPLOAD_NAME_PATTERN, UploadReceiver
+from bunraku.ingest.upload import FILE_REQUEST_BODY, UPLOAD_NAME_PATTERN, UploadReceiver
 from bunraku.ingest.worker_slots import WorkerSlots
 from bunraku.messaging.recording_request import RECORDING_SUBJECT
 from bunraku.runtime.context import ServiceContext
@@ -98,7 +98,7 @@ def create_app(context: ServiceContext) -> FastAPI:
     problem_details.install_problem_handlers(app)
     add_prop_routes(app, context, props, uploads)
 
-    @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
+    @app.post("/v1/motions", status_code=201, tags=["motions"], openapi_extra=FILE_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
     async def upload(
         request: Request,
@@ -137,7 +137,7 @@ def create_app(context: ServiceContext) -> FastAPI:
         )
         return _stored_response(outcome)
 
-    @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=_BINARY_REQUEST_BODY)
+    @app.post("/v1/motions/{motion}/audio", status_code=201, tags=["motions"], openapi_extra=FILE_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
     async def add_audio(request: Request, motion: str, filename: Filename, upload: UploadName = None) -> Response:
         """Create a copy of a motion with the sound of the file in the request body: WAV, FLAC, MP3 or Ogg.
@@ -306,11 +306,3 @@ def create_app(context: ServiceContext) -> FastAPI:
 def _stored_response(outcome: StoreOutcome) -> Response:
     entry, is_new = outcome
     return JSONResponse(entry_json(entry), 201 if is_new else 200, {"Location": f"/v1/motions/{entry.id}"})
-
-
-_BINARY_REQUEST_BODY = {
-    "requestBody": {
-        "required": True,
-        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
-    }
-}

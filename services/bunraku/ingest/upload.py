@@ -25,6 +25,13 @@ from bunraku.runtime.temporary_folder import temporary_folder
 
 UPLOAD_NAME_PATTERN = r"^[A-Za-z0-9_-]{8,64}$"
 """Pattern of an upload's name, which its client chooses at random."""
+FILE_REQUEST_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/octet-stream": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+"""Request body of an upload in the OpenAPI document."""
 MAX_UPLOADS = 64
 """Uploads that are received, wait for a worker slot or are processed at the same time; further ones get 503."""
 MAX_UPLOADS_PER_HOLDER = 8

@@ -15,7 +15,7 @@ from bunraku.http.immutable_resource import immutable_headers, not_modified
 from bunraku.ingest.labels import require_ownership
 from bunraku.ingest.props.model_cache import ModelCache
 from bunraku.ingest.props.operation import PropFit, PropOperation, create_prop_job, prop_json
-from bunraku.ingest.upload import UPLOAD_NAME_PATTERN, UploadReceiver
+from bunraku.ingest.upload import FILE_REQUEST_BODY, UPLOAD_NAME_PATTERN, UploadReceiver
 from bunraku.props.model_file import MEDIA_TYPE
 from bunraku.props.placing import MAX_LENGTH_M, MIN_LENGTH_M, Grip
 from bunraku.runtime.context import ServiceContext
@@ -37,7 +37,7 @@ def add_prop_routes(app: FastAPI, context: ServiceContext, operation: PropOperat
             raise _prop_not_found(prop)
         return found
 
-    @app.post("/v1/props", status_code=201, tags=["props"], openapi_extra=_FILE_REQUEST_BODY)
+    @app.post("/v1/props", status_code=201, tags=["props"], openapi_extra=FILE_REQUEST_BODY)
     @requires(Role.INGEST, max_body_bytes=None)
     async def add(
         request: Request,
@@ -119,11 +119,3 @@ def add_prop_routes(app: FastAPI, context: ServiceContext, operation: PropOperat
 
 def _prop_not_found(prop: str) -> ProblemError:
     return ProblemError(404, "No such prop", f"there is no prop {prop[:64]!r}", hint="GET /v1/props lists all")
-
-
-_FILE_REQUEST_BODY = {
-    "requestBody": {
-        "required": True,
-        "content": {MEDIA_TYPE: {"schema": {"type": "string", "format": "binary"}}},
-    }
-}
