@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from bunraku.motion.errors import UnreadableFile
 from bunraku.runtime.display_text import clean_document
 from bunraku.runtime.problem import ProblemError
 
@@ -35,6 +36,11 @@ class JobRejection:
     line: int | None = None
     field: str | None = None
     hint: str | None = None
+
+
+def reject_file(error: UnreadableFile) -> JobRejection:
+    """Return the rejection of a file that cannot be read."""
+    return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
 
 
 def require_result(outcome: JobResult | JobRejection, **problem_members: str) -> JobResult:

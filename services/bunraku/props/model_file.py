@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.motion.rotation import Array
+from bunraku.props.material import ALPHA
 from bunraku.props.placing import PropForm
 from bunraku.props.surface import Triangles
 
@@ -49,7 +50,7 @@ def weld_model(model: PropModel) -> PropModel:
         ]
     ).astype(np.int64)
     # the opacity is not drawn
-    columns[:, 9] = 255
+    columns[:, 6 + ALPHA] = 255
     kept, number = np.unique(columns, axis=0, return_inverse=True)
     triangles = number.reshape(-1)[model.triangles]
     places = kept[:, :3]

@@ -47,7 +47,7 @@ def read_prop(
     model = weld_model(
         PropModel(
             placed,
-            np.vstack([surface.corners[:, 3:6] for surface in surfaces]),
+            np.vstack([surface.normals for surface in surfaces]),
             np.vstack([surface.look_at(surface.corners) for surface in surfaces]),
             triangles,
             find_form(placed, triangles),

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bunraku.motion.rotation import Array
-from bunraku.props.material import Material
+from bunraku.props.material import ALPHA, Material
 from bunraku.props.texture import linear_to_srgb
 
 Triangles = npt.NDArray[np.int64]
@@ -30,6 +30,11 @@ class Surface:
     def positions(self) -> Array:
         """Positions of the corners (n, 3)."""
         return self.corners[:, :3]
+
+    @property
+    def normals(self) -> Array:
+        """Unit normals of the corners (n, 3)."""
+        return self.corners[:, 3:6]
 
     def look_at(self, corners: Array) -> Array:
         """Return the look of points of the surface, given as its corners are."""
@@ -54,7 +59,7 @@ class Surface:
         """Return the surface without the triangles of which no corner is opaque enough to be seen."""
         if self.material.hidden_below <= 0.0:
             return self
-        is_hidden = self.look_at(self.corners)[:, 3] < self.material.hidden_below
+        is_hidden = self.look_at(self.corners)[:, ALPHA] < self.material.hidden_below
         return replace(self, triangles=self.triangles[~is_hidden[self.triangles].all(axis=1)])
 
     def _is_closed(self) -> bool:

@@ -16,7 +16,7 @@ from bunraku.codec.extension.encoder import EncodedExtension, encode_extension
 from bunraku.codec.extension.track import Extension
 from bunraku.codec.skeleton_description import BoneTooLong
 from bunraku.ingest.jobs.encoding import describe_encoding, encode_foot_contacts, encode_motions
-from bunraku.ingest.result import NOTHING_MOVES, JobRejection, JobResult
+from bunraku.ingest.result import NOTHING_MOVES, JobRejection, JobResult, reject_file
 from bunraku.marionette.limb_rig import ArmRig, Limb
 from bunraku.marionette.proportions import ProportionsError
 from bunraku.motion.analysis import Analysis, analyse
@@ -53,7 +53,7 @@ def encode_file(
         for limb in (Limb.LEFT_HAND, Limb.RIGHT_HAND):
             ArmRig(analysis.motion.figure, limb)
     except UnreadableFile as error:
-        return _reject(error)
+        return reject_file(error)
     except ProportionsError as error:
         detail = f"the arms of this skeleton cannot be controlled: {error}"
         return JobRejection("No puppet's arms", detail, field=error.field, hint=error.hint)
@@ -126,11 +126,7 @@ def list_file_takes(path: Path, limit: int, opens_files: bool = True) -> TakeLis
     try:
         return list_takes(path.read_bytes(), limit, opens_files)
     except UnreadableFile as error:
-        return _reject(error)
-
-
-def _reject(error: UnreadableFile) -> JobRejection:
-    return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
+        return reject_file(error)
 
 
 def _is_still(analysis: Analysis) -> bool:

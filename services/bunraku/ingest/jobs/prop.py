@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from bunraku.ingest.jobs.image_file import decode_image
-from bunraku.ingest.result import JobRejection, JobResult
+from bunraku.ingest.result import JobRejection, JobResult, reject_file
 from bunraku.motion.errors import UnreadableFile
 from bunraku.props.model_file import write_model
 from bunraku.props.placing import Grip
@@ -25,7 +25,7 @@ def make_prop(
     try:
         model, guessed = read_prop(path.read_bytes(), decode_image, length, grip)
     except UnreadableFile as error:
-        return JobRejection(error.title, error.detail, error.line, error.field, error.hint or None)
+        return reject_file(error)
     # without a time of compression: equal models have equal bytes
     packed = gzip.compress(write_model(model), mtime=0)
     description = {

@@ -9,7 +9,7 @@ from collections.abc import Awaitable, Callable
 from weakref import WeakValueDictionary
 
 MAX_CACHED_MODELS = 32
-"""Models that are kept: at most 1 MB each, most of them a few kilobytes."""
+"""Models that are kept: at most 2.5 MB each, most of them less than 0.1 MB."""
 MAX_AGE_S = 60.0
 """Time after which a model is loaded again: another replica may have removed the prop."""
 

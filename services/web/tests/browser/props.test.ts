@@ -1,10 +1,10 @@
 /** Props: added by the panel, put into hands, passed to another performer, laid down and seen by others. */
-import { buffer } from "node:stream/consumers";
 import type { Page } from "playwright-core";
 import { expect, test } from "vitest";
 import { findViolations } from "./accessibility";
 import { describeInBrowser, type OpenOptions } from "./browser-suite";
 import { evaluateInEngine, waitInEngine } from "./engine-probe";
+import { downloadNodeNames } from "./glb-download";
 import {
   pauseAtStart,
   stopDrawing,
@@ -200,20 +200,7 @@ describeInBrowser("props", { server: "open" }, (fixture) => {
     await waitForFirstPose(recorded);
     await recorded.keyboard.press("ArrowRight");
     await waitForHand(recorded, RIGHT_HAND);
-    await recorded.getByRole("button", { name: "Library", exact: true }).click();
-    await recorded.getByRole("button", { name: "Download With a fan", exact: true }).click();
-    const [download] = await Promise.all([
-      recorded.waitForEvent("download"),
-      recorded
-        .getByRole("group", { name: "Download With a fan as", exact: true })
-        .getByRole("button", { name: /^GLB,/ })
-        .click(),
-    ]);
-    const file = await buffer(await download.createReadStream());
-    const { nodes } = JSON.parse(file.subarray(20, 20 + file.readUInt32LE(12)).toString()) as {
-      nodes: { name: string }[];
-    };
-    expect(nodes.map(({ name }) => name)).toContain("prop 1 fan");
+    expect(await downloadNodeNames(recorded, "With a fan")).toContain("prop 1 fan");
   });
 
   test.each([
