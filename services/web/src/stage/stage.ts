@@ -281,7 +281,7 @@ export class Stage {
     if (hasPose && this.#firstFrame === "pending") this.#firstFrame = "submitted";
     if (this.#firstFrame !== "submitted") this.#addScenery();
     if (this.#frameRenderer.quality !== this.#appliedQuality) this.#applyQuality();
-    this.#scenery.prepare(this.renderer);
+    this.#scenery.prepare(this.renderer, audience.camera);
     this.#performerGroup.prepare(this.renderer, this.scene, audience.camera, this.#look);
     this.#frameRenderer.draw(this.scene, audience.camera, hasPose ? this.#edgeBoxes : null);
     this.#isUpToDate = true;

@@ -1,17 +1,8 @@
 /**
  * Backdrop: the disc of gold leaf on its ground, a plane behind the stage. The floor reflects the same GLSL function.
  */
-import {
-  type BufferAttribute,
-  type BufferGeometry,
-  Color,
-  type IUniform,
-  Mesh,
-  PlaneGeometry,
-  ShaderMaterial,
-  Vector2,
-} from "three";
-import { orderTriangles } from "../rendering/triangle-order";
+import { type BufferAttribute, Color, type IUniform, Mesh, PlaneGeometry, ShaderMaterial, Vector2 } from "three";
+import { CulledTriangles } from "../rendering/culled-triangles";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 import { createDenseGrid } from "./dense-grid";
 import type { Look } from "./look";
@@ -118,6 +109,8 @@ vec3 displayedBackdrop(vec2 at, float blur) {
 
 export interface Backdrop {
   readonly mesh: Mesh;
+  /** Triangles of the grid for simple materials. */
+  readonly triangles: CulledTriangles;
   /** Draws the baked function. */
   usesSimpleMaterials: boolean;
   /** Follow a change of the disc's position or radius. */
@@ -145,13 +138,16 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
       }),
   );
   const [plane, grid] = [new PlaneGeometry(...SIZE_M), createDenseGrid(SIZE_M, 48, 28, "lower")];
+  const { position } = grid.attributes;
   const cells = Array.from((grid.index as BufferAttribute).array);
+  const triangles = new CulledTriangles(grid);
   const mesh = new Mesh<PlaneGeometry, ShaderMaterial | ShaderMaterial[]>(plane, detailed);
   mesh.name = "backdrop";
   mesh.position.set(0, HEIGHT_M, BACKDROP_Z_M);
   mesh.onBeforeRender = updateVignette(vignette);
   const backdrop = {
     mesh,
+    triangles,
     get usesSimpleMaterials() {
       return mesh.material === simple;
     },
@@ -164,9 +160,9 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
     },
     fitDisc() {
       const { discCentre, discRadius } = uniforms;
-      splitGrid(grid, cells, (x, y) => {
-        const away = Math.hypot(x - discCentre.value.x, y + HEIGHT_M - discCentre.value.y);
-        return away < discRadius.value + DISC_MARGIN_M;
+      triangles.triangles = splitCells(cells, (corner) => {
+        const [x, y] = [position.getX(corner), position.getY(corner) + HEIGHT_M];
+        return Math.hypot(x - discCentre.value.x, y - discCentre.value.y) < discRadius.value + DISC_MARGIN_M;
       });
     },
     dispose() {
@@ -179,22 +175,16 @@ export function createBackdrop(uniforms: BackdropUniforms, vignette: VignetteUni
 }
 
 /**
- * Divide the triangles of a grid into two groups: those with a corner for which `isInside` is true, whose cells are
- * `cells`, and the others.
+ * Divide the cells of a grid, given by the corners of their triangles, into two groups: those with a corner for which
+ * `isInside` is true, and the others.
  */
-function splitGrid(grid: BufferGeometry, cells: readonly number[], isInside: (x: number, y: number) => boolean): void {
-  const { position } = grid.attributes;
-  const inside: number[] = [];
-  const outside: number[] = [];
+function splitCells(cells: readonly number[], isInside: (corner: number) => boolean): [number[], number[]] {
+  const [inside, outside]: [number[], number[]] = [[], []];
   for (let at = 0; at < cells.length; at += CELL_INDICES) {
     const cell = cells.slice(at, at + CELL_INDICES);
-    const part = cell.some((corner) => isInside(position.getX(corner), position.getY(corner))) ? inside : outside;
-    part.push(...cell);
+    (cell.some(isInside) ? inside : outside).push(...cell);
   }
-  grid.setIndex([...orderTriangles(inside), ...orderTriangles(outside)]);
-  grid.clearGroups();
-  grid.addGroup(0, inside.length, 0);
-  grid.addGroup(inside.length, outside.length, 1);
+  return [inside, outside];
 }
 
 const VERTEX_GLSL = /* glsl */ `

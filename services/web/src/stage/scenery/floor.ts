@@ -18,20 +18,14 @@ import {
   type Vector2,
   type WebGLProgramParametersWithUniforms,
 } from "three";
-import { orderTriangles } from "../rendering/triangle-order";
+import { CulledTriangles } from "../rendering/culled-triangles";
 import { BACKDROP_GLSL, BACKDROP_Z_M, type BackdropUniforms } from "./backdrop";
 import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 import { createDenseGrid } from "./dense-grid";
 import type { Look } from "./look";
 import { NOISE_GLSL } from "./noise";
 import { REFLECTED_LIGHT_GLSL } from "./reflected-light";
-import {
-  updateVignette,
-  VIGNETTE_GLSL,
-  VIGNETTE_VARYING_GLSL,
-  VIGNETTE_VERTEX_GLSL,
-  type VignetteUniforms,
-} from "./vignette";
+import { updateVignette, VIGNETTE_GLSL, VIGNETTE_VERTEX_GLSL, type VignetteUniforms } from "./vignette";
 
 /** Width and depth in metres. */
 const SIZE_M = [26, 9] as const;
@@ -68,50 +62,53 @@ const HORIZON_GLSL = /* glsl */ `
 if (dark < .5) gl_FragColor.rgb = mix(gl_FragColor.rgb, backdrop(vec2(at.x, -.2), .3), horizon);
 `;
 
+/**
+ * Colours at the corners, displayed ones: a pixel is `vLit`, which boards darken, and `vUnlit`. `vBoards` has the place on
+ * the boards, and how much grain and gaps change the light.
+ */
 const SIMPLE_VERTEX_GLSL = /* glsl */ `
 #include <common>
 #include <tonemapping_pars_fragment>
 ${REFLECTED_LIGHT_GLSL}
 ${BAKED_GLSL}
 ${VIGNETTE_VERTEX_GLSL}
-uniform vec3 colour; uniform float ambient, rough, dark; uniform mat4 intoRig; uniform vec2 travelled;
-varying vec2 vBoard, vLanding; varying vec3 vWood, vFar; varying float vMirror, vHorizon;
+uniform vec3 colour, vignetteColour; uniform float ambient, rough, dark; uniform mat4 intoRig; uniform vec2 travelled;
+varying vec4 vBoards; varying vec3 vLit, vUnlit;
 void main() {
   vec4 place = modelMatrix * vec4(position, 1.);
   vec4 seen = viewMatrix * place;
   gl_Position = projectionMatrix * seen;
   vec3 eye = normalize(mat3(intoRig) * (place.xyz - cameraPosition));
   vec2 at = (intoRig * place).xz;
-  vBoard = at + travelled;
   vec3 bounce = vec3(eye.x, -eye.y, eye.z);
-  vLanding = vec2(at.x, 0.) + bounce.xy * (${BACKDROP_Z_M.toFixed(2)} - at.y) / min(bounce.z, -1e-3);
+  vec2 landing = vec2(at.x, 0.) + bounce.xy * (${BACKDROP_Z_M.toFixed(2)} - at.y) / min(bounce.z, -1e-3);
   float fresnel = .05 + .95 * pow(1. - abs(eye.y), 5.);
   vec3 wood = reflectedLight(seen.xyz, normalize(normalMatrix * normal), colour, ambient, rough)
     * mix(1., mix(.35, 1., exp(-.28 * dot(at, at))), dark);
+  float mirror = mix(.35 * fresnel, .95 * (.9 * fresnel + .13), dark);
   // Displayed colours have about the roots of linear ones: their squares add up.
-  vWood = pow(ACESFilmicToneMapping(wood), vec3(2. / 2.2));
-  vMirror = mix(.35 * fresnel, .95 * (.9 * fresnel + .13), dark);
-  vWood *= 1. - vMirror * (1. - dark);
-  vHorizon = mix(
+  wood = pow(ACESFilmicToneMapping(wood), vec3(2. / 2.2)) * (1. - mirror * (1. - dark));
+  vec3 mirrored = texture2D(bakedBlurred, bakedPlace(landing)).rgb;
+  vec3 sum = wood + mirror * mirrored * mirrored;
+  float share = dot(wood, vec3(1.)) / max(dot(sum, vec3(1.)), 1e-4);
+  float gapLoss = 1. - sqrt(1. - mix(.1, .6, dark) * share - .4 * dark * (1. - share));
+  vBoards = vec4(at + travelled, .5 * mix(.05, .5, dark) * share, gapLoss);
+  float horizon = mix(
     max(smoothstep(.5, 2.6, -at.y + .15 * abs(at.x)), .8 * smoothstep(.9, 3.4, length(at))),
     smoothstep(1.3, ${(0.2 - BACKDROP_Z_M).toFixed(2)}, -at.y + .22 * abs(at.x)),
     dark);
-  vFar = texture2D(bakedBlurred, bakedPlace(vec2(at.x, mix(-.2, .02, dark)))).rgb;
+  vec3 far = texture2D(bakedBlurred, bakedPlace(vec2(at.x, mix(-.2, .02, dark)))).rgb;
   setVignette();
+  vLit = sqrt(sum) * (1. - horizon) * (1. - vShade);
+  vUnlit = mix(far * horizon, vignetteColour, vShade);
 }`;
 const SIMPLE_FRAGMENT_GLSL = /* glsl */ `
-uniform float dark;
-varying vec2 vBoard, vLanding; varying vec3 vWood, vFar; varying float vMirror, vHorizon;
+varying vec4 vBoards; varying vec3 vLit, vUnlit;
 ${NOISE_GLSL}
-${BAKED_GLSL}
-${VIGNETTE_VARYING_GLSL}
 void main() {
-  float grain = noise2(vBoard * vec2(2., 26.)) - .5;
-  float gap = smoothstep(.478, .497, abs(fract(vBoard.x * 1.55) - .5));
-  vec3 wood = vWood * (1. + mix(.05, .5, dark) * grain) * (1. - mix(.1, .6, dark) * gap);
-  vec3 mirrored = texture2D(bakedBlurred, bakedPlace(vLanding + vec2(.03 * grain, 0.))).rgb;
-  vec3 shown = sqrt(wood + vMirror * (1. - .4 * dark * gap) * mirrored * mirrored);
-  gl_FragColor = vec4(withVignette(mix(shown, vFar, vHorizon)), 1.);
+  float grain = noise2(vBoards.xy * vec2(2., 26.)) - .5;
+  float gap = smoothstep(.478, .497, abs(fract(vBoards.x * 1.55) - .5));
+  gl_FragColor = vec4(vLit * (1. + vBoards.z * grain - vBoards.w * gap) + vUnlit, 1.);
 }`;
 
 /** Return the plane as a grid, which is denser where performers stand. */
@@ -122,12 +119,13 @@ function createGrid(): PlaneGeometry {
   for (let cell = 0; cell < array.length; cell += 6)
     if (grid.attributes.position.getX(array[cell]) < 0)
       [array[cell + 2], array[cell + 3]] = [array[cell + 4], array[cell]];
-  grid.setIndex(orderTriangles(array));
   return grid;
 }
 
 export interface Floor {
   readonly mesh: Mesh;
+  /** Triangles of the grid for simple materials. */
+  readonly triangles: CulledTriangles;
   /** Draws light and reflection from corner to corner of a grid, with a baked backdrop. */
   usesSimpleMaterials: boolean;
   applyLook(look: Look): void;
@@ -154,23 +152,26 @@ export function createFloor({ backdrop, vignette, baked }: FloorSurroundings, ri
   const placed = { ...vignette, travelled: { value: offset }, intoRig };
   const glossy = new MeshStandardMaterial({ transparent: true });
   glossy.onBeforeCompile = (shader) => patchShader(shader, { ...backdrop, ...placed, opacityNear });
-  const simple = new ShaderMaterial({
-    uniforms: {
-      ...UniformsUtils.clone(UniformsLib.lights),
-      ...placed,
-      ...baked,
-      dark: backdrop.dark,
-      colour,
-      ambient,
-      rough,
-    },
-    vertexShader: SIMPLE_VERTEX_GLSL,
-    fragmentShader: SIMPLE_FRAGMENT_GLSL,
-    lights: true,
-    toneMapped: false,
-  });
+  const simple = [
+    new ShaderMaterial({
+      uniforms: {
+        ...UniformsUtils.clone(UniformsLib.lights),
+        ...placed,
+        ...baked,
+        dark: backdrop.dark,
+        colour,
+        ambient,
+        rough,
+      },
+      vertexShader: SIMPLE_VERTEX_GLSL,
+      fragmentShader: SIMPLE_FRAGMENT_GLSL,
+      lights: true,
+      toneMapped: false,
+    }),
+  ];
   const [plane, grid] = [new PlaneGeometry(...SIZE_M), createGrid()];
-  const mesh = new Mesh<PlaneGeometry, MeshStandardMaterial | ShaderMaterial>(plane, glossy);
+  const triangles = new CulledTriangles(grid);
+  const mesh = new Mesh<PlaneGeometry, MeshStandardMaterial | ShaderMaterial[]>(plane, glossy);
   mesh.name = "floor";
   mesh.rotation.x = -Math.PI / 2;
   mesh.position.z = BACKDROP_Z_M + SIZE_M[1] / 2;
@@ -183,6 +184,7 @@ export function createFloor({ backdrop, vignette, baked }: FloorSurroundings, ri
   };
   return {
     mesh,
+    triangles,
     get usesSimpleMaterials() {
       return mesh.material === simple;
     },
@@ -199,7 +201,7 @@ export function createFloor({ backdrop, vignette, baked }: FloorSurroundings, ri
       opacityNear.value = floor.opacity;
     },
     dispose() {
-      for (const part of [plane, grid, glossy, simple]) part.dispose();
+      for (const part of [plane, grid, glossy, ...simple]) part.dispose();
     },
   };
 }

@@ -2,7 +2,7 @@
  * Scenery: backdrop and floor. It turns with a camera that circles the stage, since it has no back side; in the
  * audience view it does not turn.
  */
-import { Group, Vector2, Vector3, type WebGLRenderer } from "three";
+import { type Camera, Group, Vector2, Vector3, type WebGLRenderer } from "three";
 import type { CameraView } from "../camera/view";
 import { applyLookToBackdrop, createBackdrop, createBackdropUniforms } from "./backdrop";
 import { BakedBackdrop } from "./baked-backdrop";
@@ -65,9 +65,15 @@ export class Scenery {
     this.#bakedBackdrop.invalidate();
   }
 
-  /** Draw the textures that the next frame needs. */
-  prepare(renderer: WebGLRenderer): void {
-    if (this.group.parent && this.#backdrop.usesSimpleMaterials) this.#bakedBackdrop.update(renderer);
+  /**
+   * Draw the textures that the next frame needs. With `camera`, the one that it is drawn through, simple materials leave
+   * out what it does not see. World matrices are up to date.
+   */
+  prepare(renderer: WebGLRenderer, camera?: Camera): void {
+    if (!this.group.parent || !this.#backdrop.usesSimpleMaterials) return;
+    this.#bakedBackdrop.update(renderer);
+    if (camera)
+      for (const { mesh, triangles } of [this.#backdrop, this.#floor]) triangles.cull(camera, mesh.matrixWorld);
   }
 
   dispose(): void {
