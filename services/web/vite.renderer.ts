@@ -51,7 +51,8 @@ const UNUSED_METHODS = `
   slerpQuaternions
   extractBasis makeRotationAxis makeRotationX makeShear setFromMatrix3 transposeIntoArray
   getHex getHexString getHSL getStyle lerpHSL offsetHSL
-  containsBox expandByScalar intersectsBox intersectsTriangle setFromCenterAndSize setFromObject
+  containsBox containsPoint expandByScalar intersectsBox intersectsTriangle intersectTriangle setFromCenterAndSize
+  setFromObject
   closestPointToPoint distanceToSphere getArea getBoundingBox getBoundingSphere getMidpoint getPlane intersectBox
   intersectLine intersectsLine intersectSphere projectPoint recast setFromAttributeAndIndices setFromCoplanarPoints
   setFromPointsAndIndices

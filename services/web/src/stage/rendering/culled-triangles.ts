@@ -59,16 +59,14 @@ export class CulledTriangles {
   }
 
   #draw(isVisible: (tile: Tile) => boolean): void {
-    this.geometry.clearGroups();
     let end = 0;
-    this.#groups.forEach((tiles, group) => {
+    this.geometry.groups = this.#groups.map((tiles, materialIndex) => {
       const start = end;
-      for (const tile of tiles) {
-        if (!isVisible(tile)) continue;
-        this.#index.array.set(tile.indices, end);
-        end += tile.indices.length;
+      for (const { indices } of tiles.filter(isVisible)) {
+        this.#index.array.set(indices, end);
+        end += indices.length;
       }
-      this.geometry.addGroup(start, end - start, group);
+      return { start, count: end - start, materialIndex };
     });
     this.#index.needsUpdate = true;
   }

@@ -7,13 +7,7 @@ import { BAKED_GLSL, type BakedUniforms } from "./baked-uniforms";
 import { createDenseGrid } from "./dense-grid";
 import type { Look } from "./look";
 import { NOISE_GLSL } from "./noise";
-import {
-  updateVignette,
-  VIGNETTE_GLSL,
-  VIGNETTE_VARYING_GLSL,
-  VIGNETTE_VERTEX_GLSL,
-  type VignetteUniforms,
-} from "./vignette";
+import { updateVignette, VIGNETTE_GLSL, VIGNETTE_VERTEX_GLSL, type VignetteUniforms } from "./vignette";
 
 /** Position of the plane, in metres along z from the centre of the stage. */
 export const BACKDROP_Z_M = -2.6;
@@ -212,9 +206,9 @@ void main() {
 }`,
   fragmentShader: /* glsl */ `
 ${BAKED_GLSL}
-${VIGNETTE_VARYING_GLSL}
-varying vec2 vPlace;
-void main() { gl_FragColor = vec4(withVignette(texture2D(bakedSharp, vPlace).rgb), 1.); }`,
+uniform vec3 vignetteColour;
+varying vec2 vPlace; varying float vShade;
+void main() { gl_FragColor = vec4(mix(texture2D(bakedSharp, vPlace).rgb, vignetteColour, vShade), 1.); }`,
 };
 const SIMPLE_GROUND = {
   vertexShader: /* glsl */ `

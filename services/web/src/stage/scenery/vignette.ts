@@ -27,17 +27,15 @@ ${SHADE_GLSL}
 uniform vec2 pictureSize; uniform vec3 vignetteColour;
 vec3 withVignette(vec3 colour) { return mix(colour, vignetteColour, shadeOf(gl_FragCoord.xy / pictureSize)); }
 `;
-/** The same from corner to corner of a grid: `setVignette()` in the vertex shader, after the position is set. */
+/**
+ * The same from corner to corner of a grid: `setVignette()` in the vertex shader, after the position is set, sets the share
+ * of the vignette's colour, `vShade`.
+ */
 export const VIGNETTE_VERTEX_GLSL = /* glsl */ `
 ${SHADE_GLSL}
 varying float vShade;
 void setVignette() { vShade = shadeOf(clamp(.5 * gl_Position.xy / max(gl_Position.w, 1e-3) + .5, -1., 2.)); }
 `;
-export const VIGNETTE_VARYING_GLSL = /* glsl */ `
-uniform vec3 vignetteColour; varying float vShade;
-vec3 withVignette(vec3 colour) { return mix(colour, vignetteColour, vShade); }
-`;
-
 export function createVignetteUniforms(): VignetteUniforms {
   return {
     pictureSize: { value: new Vector2(1, 1) },
